@@ -130,7 +130,15 @@ impl TransferFunction {
                 &[(150.0, 0xb5653b), (350.0, 0xe3cba0), (900.0, 0xfaf2e1), (1500.0, 0xffffff)],
             ),
             "ct-soft" => (
-                &[(-400.0, 0.0), (-150.0, 0.06), (0.0, 0.06), (80.0, 0.25), (200.0, 0.3), (400.0, 0.85)],
+                &[
+                    (-400.0, 0.0),
+                    (-200.0, 0.03),
+                    (-50.0, 0.01),
+                    (20.0, 0.015),
+                    (100.0, 0.04),
+                    (200.0, 0.15),
+                    (400.0, 0.85),
+                ],
                 &[
                     (-400.0, 0xe0a080),
                     (-50.0, 0xe8b890),
@@ -184,14 +192,11 @@ impl TransferFunction {
         let opacity = list("opacity", &file.opacity)?
             .iter()
             .enumerate()
-            .map(|(i, entry)| match pair(entry) {
-                Some((value, opacity)) if number(opacity).is_some() => {
-                    Ok([value as f32, number(opacity).unwrap_or_default() as f32])
-                }
-                _ => Err(refused(
-                    &format!("opacity[{i}]"),
-                    format!("{}: expected [value, opacity]", shown(entry)),
-                )),
+            .map(|(i, entry)| {
+                let key = format!("opacity[{i}]");
+                let expected = || refused(&key, format!("{}: expected [value, opacity]", shown(entry)));
+                let (value, opacity) = pair(entry).ok_or_else(expected)?;
+                Ok([value as f32, number(opacity).ok_or_else(expected)? as f32])
             })
             .collect::<Result<_>>()?;
         let colour = match &file.colour {
@@ -210,7 +215,15 @@ impl TransferFunction {
                 })
                 .collect::<Result<_>>()?,
         };
-        Self::new(opacity, colour, file.reference_mm.map(|mm| mm as f32))
+        let reference_mm = match &file.reference_mm {
+            None => None,
+            Some(value) => {
+                let expected =
+                    || refused("reference_mm", format!("{}: expected a length > 0 mm", shown(value)));
+                Some(number(value).ok_or_else(expected)? as f32)
+            }
+        };
+        Self::new(opacity, colour, reference_mm)
     }
 
     /// `spec` is the name of a [preset](Self::preset) (for data over `range`) or the path of a TOML file.
@@ -255,11 +268,11 @@ impl TransferFunction {
     }
 }
 
-/// The file's keys. Points stay TOML values, so that errors can say which point is wrong.
+/// The file's keys. What they hold stays TOML, so that errors can say which key and which point is wrong.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    reference_mm: Option<f64>,
+    reference_mm: Option<Value>,
     opacity: Value,
     #[serde(alias = "color")]
     colour: Value,
