@@ -105,7 +105,7 @@ fn first_nine(i: u32) -> vec3<f32> {
         return vec3(0.0);
     }
     let corner = i - 1u;
-    return vec3(vec3(corner & 1u, corner >> 1u & 1u, corner >> 2u)) * 2.0 - 1.0;
+    return vec3<f32>(vec3(corner & 1u, corner >> 1u & 1u, corner >> 2u)) * 2.0 - 1.0;
 }
 
 fn classify(voxel: vec3<u32>) -> u32 {
