@@ -96,7 +96,6 @@ struct Stale {
 }
 
 /// Renders one volume.
-#[derive(Debug)]
 pub struct Renderer {
     gpu: Gpu,
     field: Field,
@@ -288,7 +287,7 @@ impl Renderer {
             rec.barrier(
                 &[Access::SampledRead, Access::GraphicsRead, Access::TransferWrite],
                 &[Access::StorageWrite, Access::SampledRead],
-            )?;
+            );
             rec.stage("opacity")?;
             self.opacity.record(
                 rec,
@@ -300,27 +299,28 @@ impl Renderer {
             rec.stage("occupancy")?;
             self.occupancy.record(rec, &self.field, &self.transfer_buffer, &self.volumes.occupancy)?;
             rec.end_stage()?;
-            rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead])?;
+            rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead]);
         }
         Ok(())
     }
 
     /// After a new V_PAO every brick of V_AO is out of date.
     fn record_all_changed(&self, rec: &mut Recorder) -> Result<()> {
-        rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(&self.volumes.changed_before, 0, self.volumes.changed_before.bytes(), 1)?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite])
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+    Ok(())
     }
 
     fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
         self.clip_set.record(rec, &self.clips)?;
         let count = &self.kernels.classify.count;
-        rec.barrier(&[Access::TransferRead, Access::StorageWrite], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::TransferRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(count, 0, count.bytes(), 0)?;
         rec.barrier(
             &[Access::TransferWrite, Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
             &[Access::StorageRead, Access::StorageWrite],
-        )?;
+        );
         rec.stage("classify")?;
         self.kernels.classify.record(
             rec,
@@ -337,7 +337,8 @@ impl Renderer {
         rec.barrier(
             &[Access::StorageWrite],
             &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
-        )
+        );
+    Ok(())
     }
 
     /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). The ambient volume must be up to date.
@@ -363,7 +364,8 @@ impl Renderer {
             frame: &self.frame,
         };
         self.raycast.record(rec, bindings, colour, depth, size)?;
-        rec.end_stage()
+        rec.end_stage()?;
+    Ok(())
     }
 
     /// Draws both eyes on the device's own queue and reads them back.
@@ -399,17 +401,17 @@ impl Renderer {
         let depths = [read_back(4 * pixels)?, read_back(4 * pixels)?];
 
         let mut rec = self.gpu.recorder("draw")?;
-        rec.discard(&colour)?;
-        rec.discard(&depth)?;
-        rec.barrier(&[], &[Access::AttachmentWrite])?;
+        rec.discard(&colour);
+        rec.discard(&depth);
+        rec.barrier(&[], &[Access::AttachmentWrite]);
         self.record_draw(&mut rec, views, look, &colour, &depth, size)?;
-        rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead])?;
+        rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
         for eye in 0..2 {
             let extent = [size[0], size[1], 1];
             rec.copy_image_to_buffer(&colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
             rec.copy_image_to_buffer(&depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
         }
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         let timings = rec.submit_and_wait()?;
 
         let read = |buffer: &Buffer| buffer.read(0, buffer.bytes());
@@ -432,7 +434,7 @@ impl Renderer {
     pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<Difference> {
         let expected = volume_image(&self.gpu, "expected ambient", &self.field, Format::R32Float)?;
         let mut rec = self.gpu.recorder("expected")?;
-        rec.discard(&expected)?;
+        rec.discard(&expected);
         rec.submit_and_wait()?;
         let v = &self.volumes;
         let settings = self.settings();
@@ -463,9 +465,9 @@ impl Renderer {
         let count = &self.kernels.classify.count;
         let read_back = self.gpu.buffer("count read-back", count.bytes(), BufferUse::Readback)?;
         let mut rec = self.gpu.recorder("read count")?;
-        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead])?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(count, 0, &read_back, 0, count.bytes())?;
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
         let [clipped, affected, untouched] = bytemuck::pod_read_unaligned(&read_back.read(0, 12)?);
         Ok(Categories { clipped, affected, untouched })
@@ -499,7 +501,7 @@ impl Renderer {
             let count = slices.min(z - first);
             let mut rec = self.gpu.recorder("read volume")?;
             rec.copy_image_to_buffer(image, 0, [0, 0, first], [x, y, count], &read_back, 0)?;
-            rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+            rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
             rec.submit_and_wait()?;
             all.extend(read_back.read(0, slice * u64::from(count))?);
             first += count;

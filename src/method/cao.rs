@@ -29,7 +29,7 @@ pub fn record(
     )?;
     rec.end_stage()?;
 
-    rec.barrier(&[Access::SampledRead, Access::GraphicsRead, Access::TransferRead], &[Access::StorageWrite])?;
+    rec.barrier(&[Access::SampledRead, Access::GraphicsRead, Access::TransferRead], &[Access::StorageWrite]);
     rec.stage("contextual")?;
     let bindings = Bindings {
         opacity: &volumes.opacity,
@@ -51,5 +51,6 @@ pub fn record(
     rec.barrier(
         &[Access::StorageWrite],
         &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
-    )
+    );
+    Ok(())
 }

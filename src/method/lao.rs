@@ -35,7 +35,8 @@ pub fn record(
     rec.barrier(
         &[Access::StorageWrite],
         &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
-    )
+    );
+    Ok(())
 }
 
 /// The same on the device's own queue, in parts of about a tenth of a second, telling `progress` the share done (0 … 1).
@@ -55,7 +56,7 @@ pub fn run(
     let mut rec = gpu.recorder("lao bricks")?;
     list(&mut rec, field, kernels, volumes, settings, opacity, ambient)?;
     rec.copy_buffer(&volumes.list.buffer, BrickList::COUNT_AT, &read_back, 0, 4)?;
-    rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+    rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
     let mut timings = rec.submit_and_wait()?;
     let count: u32 = bytemuck::pod_read_unaligned(&read_back.read(0, 4)?);
 
@@ -105,12 +106,12 @@ fn list(
     rec.barrier(
         &[Access::SampledRead, Access::GraphicsRead, Access::StorageWrite, Access::TransferRead],
         &[Access::TransferWrite],
-    )?;
+    );
     rec.clear_image(ambient, [1.0; 4])?;
     rec.barrier(
         &[Access::TransferWrite, Access::StorageWrite],
         &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
-    )?;
+    );
     rec.stage("bricks")?;
     let which = match settings.scope {
         Scope::All => Which::All,
@@ -125,7 +126,8 @@ fn list(
         &volumes.changed_before,
         &volumes.list,
     )?;
-    rec.end_stage()
+    rec.end_stage()?;
+    Ok(())
 }
 
 fn bindings<'a>(volumes: &'a Volumes, opacity: &'a Image, ambient: &'a Image) -> Bindings<'a> {

@@ -9,7 +9,6 @@ use crate::stage::field::Field;
 use crate::stage::lao::{Lao, Scope};
 
 /// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 12 a brick of 512.
-#[derive(Debug)]
 pub struct Volumes {
     /// Opacity before clipping, r32float.
     pub full_opacity: Image,
@@ -51,9 +50,9 @@ impl Volumes {
             &volumes.precomputed,
             &volumes.ambient,
         ] {
-            rec.discard(image)?;
+            rec.discard(image);
         }
-        rec.barrier(&[], &[Access::TransferWrite])?;
+        rec.barrier(&[], &[Access::TransferWrite]);
         rec.clear_image(&volumes.precomputed, [1.0; 4])?;
         rec.clear_image(&volumes.ambient, [1.0; 4])?;
         rec.submit_and_wait()?;
@@ -68,7 +67,6 @@ pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Res
 }
 
 /// The kernels that methods share.
-#[derive(Debug)]
 pub struct Kernels {
     /// Stage 4, and the reach of its clips.
     pub classify: Classify,

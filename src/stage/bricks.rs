@@ -33,7 +33,6 @@ pub enum Which {
 }
 
 /// A list of bricks in device memory.
-#[derive(Debug)]
 pub struct BrickList {
     /// Group counts x, y, z for an indirect dispatch, number of bricks, their indices (x fastest) in no fixed order.
     pub buffer: Buffer,
@@ -51,7 +50,6 @@ impl BrickList {
 }
 
 /// The kernel `bricks`.
-#[derive(Debug)]
 pub struct Bricks {
     pipeline: Pipeline,
 }
@@ -75,9 +73,9 @@ impl Bricks {
         changed_before: &Buffer,
         list: &BrickList,
     ) -> Result<()> {
-        rec.barrier(&[Access::IndirectRead, Access::StorageRead], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::IndirectRead, Access::StorageRead], &[Access::TransferWrite]);
         rec.update(&list.buffer, 0, bytemuck::bytes_of(&[0_u32, 0, 1, 0]))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let params = Params { dims: field.dims, mode: which as u32, bricks: field.bricks(), pad: 0 };
         let binds = [
             ("opacity", Bind::Image(opacity)),
@@ -90,6 +88,7 @@ impl Bricks {
         rec.barrier(
             &[Access::StorageWrite],
             &[Access::IndirectRead, Access::StorageRead, Access::StorageWrite, Access::TransferRead],
-        )
+        );
+    Ok(())
     }
 }

@@ -38,7 +38,6 @@ pub enum AntiAliasing {
 }
 
 /// The kernel `classify`.
-#[derive(Debug)]
 pub struct Classify {
     pipeline: Pipeline,
     positions: Buffer,

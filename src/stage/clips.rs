@@ -102,7 +102,6 @@ pub struct MeshClip {
 }
 
 /// The layers of a mesh at one scale and margin.
-#[derive(Debug)]
 struct Peeled {
     mesh: Arc<TriangleMesh>,
     scale: Vec3,
@@ -112,7 +111,6 @@ struct Peeled {
 }
 
 /// The clips of a scene in device memory.
-#[derive(Debug)]
 pub struct ClipSet {
     /// Bound as `clips`.
     pub clips: Buffer,
@@ -215,7 +213,7 @@ impl ClipSet {
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
         let mut rec = gpu.recorder("dilate")?;
         for mesh in &self.meshes {
-            rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite])?;
+            rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
             dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
         }
         rec.submit_and_wait()?;
@@ -257,9 +255,10 @@ impl ClipSet {
                 }
             };
         }
-        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead])
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
+    Ok(())
     }
 }
 

@@ -41,7 +41,6 @@ pub struct Difference {
 }
 
 /// The kernel `compare`.
-#[derive(Debug)]
 pub struct Compare {
     pipeline: Pipeline,
 }
@@ -69,7 +68,7 @@ impl Compare {
         let read_back = gpu.buffer("difference read-back", bytes, BufferUse::Readback)?;
         let mut rec = gpu.recorder("compare")?;
         rec.fill(&difference, 0, bytes, 0)?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let params = Params { dims: field.dims, only_needed: u32::from(scope == Scope::Needed) };
         let binds = [
             ("opacity", Bind::Image(opacity)),
@@ -79,9 +78,9 @@ impl Compare {
             ("difference", Bind::Buffer(&difference)),
         ];
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)?;
-        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead])?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(&difference, 0, &read_back, 0, bytes)?;
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
         let c: Counters = bytemuck::pod_read_unaligned(&read_back.read(0, bytes)?);
         Ok(Difference {

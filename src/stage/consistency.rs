@@ -29,7 +29,6 @@ pub struct Seen {
 }
 
 /// The kernel `consistency`.
-#[derive(Debug)]
 pub struct Consistency {
     pipeline: Pipeline,
     field: Sampler,
@@ -75,9 +74,9 @@ impl Consistency {
             ("seen", Bind::Buffer(&seen)),
         ];
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), [params.count, 1, 1])?;
-        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead])?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(&seen, 0, &read_back, 0, bytes)?;
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
         Ok(bytemuck::pod_collect_to_vec(&read_back.read(0, bytes)?))
     }

@@ -28,7 +28,6 @@ layout_check!(Params => shaders::dilate::DILATE_PARAMS {
 });
 
 /// The kernel `dilate`.
-#[derive(Debug)]
 pub struct Dilate {
     reduce: Pipeline,
     main: Pipeline,
@@ -73,7 +72,7 @@ impl Dilate {
         let push = bytemuck::bytes_of(&params);
         let binds = [("layers", Bind::Buffer(layers)), ("blocks", Bind::Buffer(blocks))];
         rec.dispatch_over(&self.reduce, &binds, push, over)?;
-        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead])?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         let binds = [("blocks", Bind::Buffer(blocks)), ("dilation", Bind::Buffer(dilation))];
         rec.dispatch_over(&self.main, &binds, push, over)
     }

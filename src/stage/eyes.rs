@@ -97,7 +97,6 @@ impl Look {
 }
 
 /// Both eyes and the frame's settings in device memory.
-#[derive(Debug)]
 pub struct FrameBuffer {
     /// Bound as `frame`.
     pub buffer: Buffer,
@@ -144,8 +143,9 @@ impl FrameBuffer {
         data.scale = field.scale;
         data.occluded = f32::from(u8::from(look.occluded));
         data.jitter = f32::from(u8::from(look.jitter));
-        rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead])
+        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);
+    Ok(())
     }
 }

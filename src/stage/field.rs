@@ -12,7 +12,6 @@ use crate::Result;
 pub const BRICK: u32 = 8;
 
 /// A volume on the device.
-#[derive(Debug)]
 pub struct Field {
     /// Voxels along x, y, z.
     pub dims: [u32; 3],
@@ -57,8 +56,8 @@ impl Field {
             staging.write(0, &texels(volume, range))?;
             let mut rec = gpu.recorder("upload")?;
             if first == 0 {
-                rec.discard(&image)?;
-                rec.barrier(&[], &[Access::TransferWrite])?;
+                rec.discard(&image);
+                rec.barrier(&[], &[Access::TransferWrite]);
             }
             rec.copy_buffer_to_image(&staging, 0, &image, [0, 0, first], [dims[0], dims[1], count])?;
             rec.submit_and_wait()?;

@@ -61,7 +61,7 @@ pub enum Work {
 }
 
 /// What the kernel reads and writes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Bindings<'a> {
     /// V_o, clipped or not.
     pub opacity: &'a Image,
@@ -76,7 +76,6 @@ pub struct Bindings<'a> {
 }
 
 /// The kernel `lao` with its ray set.
-#[derive(Debug)]
 pub struct Lao {
     pipeline: Pipeline,
     field: Sampler,
@@ -99,9 +98,10 @@ impl Lao {
         for (slot, (unit, weight)) in data.ray.iter_mut().zip(occlusion.rays.unit_vectors()) {
             *slot = unit.extend(weight).to_array();
         }
-        rec.barrier(&[Access::UniformRead], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::UniformRead], &[Access::TransferWrite]);
         rec.update(&self.rays, 0, bytemuck::bytes_of(&data))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead])
+        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead]);
+    Ok(())
     }
 
     /// Works on the whole list by one indirect dispatch.

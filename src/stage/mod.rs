@@ -26,7 +26,7 @@ fn device_buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Result<Buffer> {
     staging.write(0, content)?;
     let buffer = gpu.buffer(name, bytes, BufferUse::Device)?;
     let mut rec = gpu.recorder("upload")?;
-    rec.barrier(&[], &[Access::TransferRead, Access::TransferWrite])?;
+    rec.barrier(&[], &[Access::TransferRead, Access::TransferWrite]);
     rec.copy_buffer(&staging, 0, &buffer, 0, bytes)?;
     rec.submit_and_wait()?;
     Ok(buffer)

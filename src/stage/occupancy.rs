@@ -22,7 +22,6 @@ struct Params {
 layout_check!(Params => shaders::occupancy::OCCUPANCY_PARAMS { dims, scale, bricks, bias });
 
 /// The kernel `occupancy`.
-#[derive(Debug)]
 pub struct Occupancy {
     pipeline: Pipeline,
 }

@@ -20,7 +20,6 @@ struct Params {
 layout_check!(Params => shaders::opacity::OPACITY_PARAMS { dims, scale, bias });
 
 /// The kernel `opacity`.
-#[derive(Debug)]
 pub struct Opacity {
     pipeline: Pipeline,
 }

@@ -32,7 +32,6 @@ struct Params {
 layout_check!(Params => shaders::peel::PEEL_PARAMS { corner, per_half, scale, per_depth, first });
 
 /// The depth layers of one mesh.
-#[derive(Debug)]
 pub struct Layers {
     /// The clip camera they were drawn from.
     pub camera: ClipCamera,
@@ -43,7 +42,6 @@ pub struct Layers {
 }
 
 /// The kernel `peel`.
-#[derive(Debug)]
 pub struct Peel {
     front: Pipeline,
     back: Pipeline,
@@ -112,10 +110,10 @@ impl Peel {
                 };
                 let mut rec = gpu.recorder("peel")?;
                 if layer == 0 {
-                    rec.discard(&before)?;
+                    rec.discard(&before);
                 }
-                rec.discard(&now)?;
-                rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead])?;
+                rec.discard(&now);
+                rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead]);
                 rec.draw(
                     pipeline,
                     &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
@@ -123,9 +121,9 @@ impl Peel {
                     Attachments { colours: &[], depth: Some((&now, Some(1.0))), layer: None, size: [edge, edge] },
                     corners.len() as u32,
                 )?;
-                rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead])?;
+                rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
                 rec.copy_image_to_buffer(&now, 0, [0; 3], [edge, edge, 1], &read_back, 0)?;
-                rec.barrier(&[Access::TransferWrite], &[Access::HostRead])?;
+                rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
                 rec.submit_and_wait()?;
                 let map: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
                 if map.iter().all(|&z| z >= 1.0) {

@@ -24,7 +24,7 @@ struct Params {
 layout_check!(Params => shaders::raycast::RAYCAST_PARAMS { size });
 
 /// What the kernel reads.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Bindings<'a> {
     /// The volume.
     pub field: &'a Field,
@@ -43,7 +43,6 @@ pub struct Bindings<'a> {
 }
 
 /// The kernel `raycast`.
-#[derive(Debug)]
 pub struct Raycast {
     pipeline: Pipeline,
     field: Sampler,

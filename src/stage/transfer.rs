@@ -21,7 +21,6 @@ struct Transfer {
 layout_check!(Transfer => shaders::opacity::TRANSFER { opacity_points, colour_points, pad0, pad1, opacity, colour });
 
 /// Control points of a transfer function in device memory.
-#[derive(Debug)]
 pub struct TransferBuffer {
     /// Bound as `transfer`.
     pub buffer: Buffer,
@@ -46,8 +45,9 @@ impl TransferBuffer {
             data.opacity[i] = [value, opacity, slope, 0.0];
         }
         data.colour[..function.colour.len()].copy_from_slice(&function.colour);
-        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite])?;
+        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead])
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
+    Ok(())
     }
 }
