@@ -12,7 +12,8 @@ use crate::gpu::{
     Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder, Timings,
 };
 use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
-use crate::method::{Method, cao, lao};
+use crate::method::{cao, lao};
+use crate::scene::Method;
 use crate::occlusion::Occlusion;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
