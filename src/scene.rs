@@ -8,7 +8,7 @@
 //! let scene = cao::scene::Scene::from_toml(
 //!     r##"
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
-//!     # volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
+//!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
 //!
@@ -29,12 +29,12 @@
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
-//!     azimuth_deg = 30                 # frames the whole volume from this side, about +z from -y
+//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y
 //!     elevation_deg = 25
-//!     distance_mm = 400                # of the eyes from the centre; default: so that all of it is seen
-//!     # position_mm = [0, -400, 100]   # or a place of one's own, with
-//!     # target_mm = [0, 0, 0]
-//!     # up = [0, 0, 1]
+//!     distance_mm = 400                # of the eyes from the centre; default: it fills the picture
+//!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
+//!     ## target_mm = [0, 0, 0]
+//!     ## up = [0, 0, 1]
 //!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance, at most 63
 //!     fov_deg = 35                     # vertical
 //!     screen_mm = 400                  # distance of the plane without parallax; default: the target
@@ -229,7 +229,7 @@ pub enum Viewpoint {
         azimuth_deg: f32,
         /// Above the xy plane.
         elevation_deg: f32,
-        /// From the centre in mm; `None` shows all of the volume.
+        /// From the centre in mm; `None` lets the volume fill the picture.
         distance_mm: Option<f32>,
     },
     /// At a place of the user's own.

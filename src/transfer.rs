@@ -126,7 +126,7 @@ impl TransferFunction {
             return Err(refused("range", problem));
         }
         let hounsfield = range.0 < HOUNSFIELD_AIR;
-        let (opacity, colour): (&[(f64, f32)], &[(f64, u32)]) = match name {
+        let (opacity, colour): (Points<f32>, Points<u32>) = match name {
             "auto" => return Self::preset(if hounsfield { "ct-bone" } else { "paper" }, range),
             "ct-bone" => (
                 &[(150.0, 0.0), (300.0, 0.3), (600.0, 0.8), (1500.0, 0.95)],
@@ -189,9 +189,8 @@ impl TransferFunction {
     /// # Errors
     /// As [`TransferFunction::from_toml`].
     pub fn from_table(table: toml::Table) -> Result<Self> {
-        let file: File = table
-            .try_into()
-            .map_err(|error: toml::de::Error| refused("transfer function", error.message()))?;
+        let file: File =
+            table.try_into().map_err(|error: toml::de::Error| refused("keys", error.message()))?;
         let opacity = list("opacity", &file.opacity)?
             .iter()
             .enumerate()
@@ -283,6 +282,9 @@ impl TransferFunction {
         text + "]\n"
     }
 }
+
+/// A preset's points: where (Hounsfield units or share of the range), and opacity or 0xrrggbb there.
+type Points<T> = &'static [(f64, T)];
 
 /// The file's keys. What they hold stays TOML, so that errors can say which key and which point is wrong.
 #[derive(Deserialize)]

@@ -38,13 +38,13 @@ fn a_volume_is_enough() {
         (10.0, RaySet::R26, Quadrature::Left)
     );
     assert_eq!((scene.occlusion.method, scene.occlusion.needed_only), (Method::Cao, true));
-    // The whole volume is in front of both eyes.
-    let rig = scene.stereo.rig([16.0; 3]);
-    for view in rig.views(1.0, 0.1, 1e3).unwrap() {
-        for corner in 0..8u8 {
-            let side = |axis: u8| if corner >> axis & 1 == 1 { 8.0 } else { -8.0 };
-            let (uv, _) = view.project(Vec3::new(side(0), side(1), side(2))).unwrap();
-            assert!(uv.min_element() > 0.0 && uv.max_element() < 1.0, "{uv}");
+    // Every face of the volume is seen at its middle, by both eyes.
+    for view in scene.stereo.rig([16.0; 3]).views(1.0, 0.1, 1e3).unwrap() {
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            for face in [axis * 8.0, axis * -8.0] {
+                let (uv, _) = view.project(face).unwrap();
+                assert!(uv.min_element() > 0.0 && uv.max_element() < 1.0, "{face}: {uv}");
+            }
         }
     }
 }
@@ -203,10 +203,7 @@ fn unknown_keys_are_refused_by_name_and_line() {
             "volume = { raw = \"Cargo.toml\", dims = [1, 1, 1], type = \"u8\", size = 3 }",
             "volume: unknown field `size`",
         ),
-        (
-            "volume = \"builtin:engine:8\"\ntransfer = { opaque = 1 }",
-            "transfer.transfer function: unknown field `opaque`",
-        ),
+        ("volume = \"builtin:engine:8\"\ntransfer = { opaque = 1 }", "transfer.keys: unknown field `opaque`"),
         ("transfer = \"mr\"", "missing field `volume`"),
     ] {
         let found = read(text).unwrap_err().to_string();
