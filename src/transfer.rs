@@ -33,7 +33,8 @@ use crate::{Error, Result};
 pub const MAX_POINTS: usize = 64;
 
 /// Preset names and what each is for. See [`TransferFunction::preset`].
-pub const PRESETS: [(&str, &str); 4] = [
+pub const PRESETS: [(&str, &str); 5] = [
+    ("auto", "ct-bone where the data look like Hounsfield units, else paper"),
     ("ct-bone", "CT: bone, all softer tissue transparent"),
     ("ct-soft", "CT: translucent skin and soft tissue over bone"),
     ("mr", "MR: brightness to opacity over the range of the data"),
@@ -124,7 +125,9 @@ impl TransferFunction {
             let problem = format!("data run from {} to {}: expected two ascending numbers", range.0, range.1);
             return Err(refused("range", problem));
         }
-        let (opacity, colour): (&[(f64, f32)], &[(f64, u32)]) = match name {
+        let hounsfield = range.0 < HOUNSFIELD_AIR;
+        let (opacity, colour): (Points<f32>, Points<u32>) = match name {
+            "auto" => return Self::preset(if hounsfield { "ct-bone" } else { "paper" }, range),
             "ct-bone" => (
                 &[(150.0, 0.0), (300.0, 0.3), (600.0, 0.8), (1500.0, 0.95)],
                 &[(150.0, 0xb5653b), (350.0, 0xe3cba0), (900.0, 0xfaf2e1), (1500.0, 0xffffff)],
@@ -157,8 +160,8 @@ impl TransferFunction {
         let value: Box<dyn Fn(f64) -> f32> = if !name.starts_with("ct-") {
             let (low, high) = widened(range);
             Box::new(move |share| (low + share * (high - low)) as f32)
-        } else if range.0 < HOUNSFIELD_AIR {
-            Box::new(|hounsfield| hounsfield as f32)
+        } else if hounsfield {
+            Box::new(|value| value as f32)
         } else {
             let (low, high) = widened(range);
             let (air, bone) = HOUNSFIELD_WINDOW;
@@ -186,9 +189,8 @@ impl TransferFunction {
     /// # Errors
     /// As [`TransferFunction::from_toml`].
     pub fn from_table(table: toml::Table) -> Result<Self> {
-        let file: File = table
-            .try_into()
-            .map_err(|error: toml::de::Error| refused("transfer function", error.message()))?;
+        let file: File =
+            table.try_into().map_err(|error: toml::de::Error| refused("keys", error.message()))?;
         let opacity = list("opacity", &file.opacity)?
             .iter()
             .enumerate()
@@ -232,7 +234,7 @@ impl TransferFunction {
     /// [`Error::Config`] when it is neither; [`Error::File`] naming file and key when the file is wrong;
     /// [`Error::Io`] when it cannot be read.
     pub fn load(spec: &str, range: (f64, f64)) -> Result<Self> {
-        if PRESETS.iter().any(|(name, _)| *name == spec) {
+        if Self::is_preset(spec) {
             return Self::preset(spec, range);
         }
         let path = Path::new(spec);
@@ -240,6 +242,19 @@ impl TransferFunction {
             let problem = format!("{spec:?} is neither a file nor a preset ({})", names());
             return Err(refused("transfer", problem));
         }
+        Self::read(path)
+    }
+
+    /// Is `name` one of [`PRESETS`]?
+    pub fn is_preset(name: &str) -> bool {
+        PRESETS.iter().any(|(preset, _)| *preset == name)
+    }
+
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file and key when it is wrong.
+    pub fn read(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
         Self::from_toml(&text).map_err(|error| match error {
@@ -267,6 +282,9 @@ impl TransferFunction {
         text + "]\n"
     }
 }
+
+/// A preset's points: where (Hounsfield units or share of the range), and opacity or 0xrrggbb there.
+type Points<T> = &'static [(f64, T)];
 
 /// The file's keys. What they hold stays TOML, so that errors can say which key and which point is wrong.
 #[derive(Deserialize)]
@@ -363,7 +381,7 @@ pub(crate) fn shown(value: &Value) -> String {
 }
 
 /// TOML tells 1 from 1.0; a user does not.
-fn number(value: &Value) -> Option<f64> {
+pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
 }
 

@@ -147,6 +147,9 @@ fn ct_presets_keep_hounsfield_units_and_map_other_data() {
     let hounsfield = TransferFunction::preset("ct-bone", (-1024.0, 3071.0)).unwrap();
     assert_eq!(hounsfield.opacity_at(100.0), 0.0, "soft tissue");
     assert!(hounsfield.opacity_at(700.0) > 0.8, "bone");
+    assert_eq!(TransferFunction::preset("auto", (-1024.0, 3071.0)).unwrap(), hounsfield);
+    let paper = TransferFunction::preset("paper", (0.0, 255.0)).unwrap();
+    assert_eq!(TransferFunction::preset("auto", (0.0, 255.0)).unwrap(), paper);
     // -1000…1500 HU over 0…255: 300 HU is 132.6.
     let bytes = TransferFunction::preset("ct-bone", (0.0, 255.0)).unwrap();
     assert!((bytes.opacity_at(132.6) - hounsfield.opacity_at(300.0)).abs() < 1e-3);
@@ -159,7 +162,7 @@ fn load_takes_presets_and_files_and_names_what_is_wrong() {
     let spec = path.to_str().unwrap();
     assert!(TransferFunction::load("mr", (0.0, 1.0)).is_ok());
     let found = TransferFunction::load("ct-bones", (0.0, 1.0)).unwrap_err().to_string();
-    assert!(found.contains("\"ct-bones\"") && found.contains("ct-bone, ct-soft, mr, paper"), "{found}");
+    assert!(found.contains("\"ct-bones\"") && found.contains("auto, ct-bone, ct-soft, mr, paper"), "{found}");
     std::fs::write(&path, opacity(&[[0.0, 0.25]]).to_toml()).unwrap();
     assert_eq!(TransferFunction::load(spec, (0.0, 1.0)).unwrap().opacity_at(0.0), 0.25);
     std::fs::write(&path, "opacity = [[0, 2]]\ncolour = \"#ffffff\"").unwrap();
