@@ -143,7 +143,10 @@ impl Volume {
 ///
 /// Errors: those of [`read`]; [`Error::Config`] for a built-in that does not exist.
 pub fn open(spec: &str) -> Result<Volume> {
-    if spec.starts_with("builtin:") { builtin::from_spec(spec) } else { read(Path::new(spec)) }
+    match spec.strip_prefix("builtin:") {
+        Some(builtin) => builtin::from_spec(builtin),
+        None => read(Path::new(spec)),
+    }
 }
 
 /// Reads a volume file of any format but raw.
