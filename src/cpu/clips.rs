@@ -92,6 +92,8 @@ pub struct MeshField {
     pub layers: MeshLayers,
     /// Region of changed voxels.
     pub dilated: DilationMap,
+    /// Whether `dilated` follows eq. (4), which asks for every clip sample of a voxel to be tested against it.
+    pub literal: bool,
     /// What the peeling found.
     pub report: Report,
 }
@@ -114,7 +116,8 @@ impl ClipField {
                 Dilation::Conservative(side) => dilate::conservative(&layers, clip.mode, radius_mm, side)?,
                 Dilation::Literal { half } => dilate::literal(&layers, clip.mode, radius_mm, half),
             };
-            field.mesh = Some(MeshField { layers, dilated, report });
+            let literal = matches!(maps.dilation, Dilation::Literal { .. });
+            field.mesh = Some(MeshField { layers, dilated, literal, report });
         }
         Ok(field)
     }
@@ -127,6 +130,19 @@ impl ClipField {
                 inside == (self.clip.mode == Mode::Remove)
             }
             None => self.clip.hides(world).unwrap_or(false),
+        }
+    }
+
+    /// Whether the ambient value of a voxel may change by this clip; `samples` are the voxel's clip samples (world,
+    /// mm), its centre first.
+    pub fn affects(&self, samples: &[Vec3]) -> bool {
+        match &self.mesh {
+            Some(mesh) => {
+                // The conservative radius covers the whole voxel around its centre; the paper counts samples.
+                let tested = if mesh.literal { samples } else { &samples[..1] };
+                tested.iter().any(|&world| mesh.dilated.dilated(self.clip.pose.to_rigid(world)))
+            }
+            None => self.clip.distance_to_hidden(samples[0]).is_some_and(|d| d <= self.radius_mm),
         }
     }
 }

@@ -24,11 +24,33 @@ pub const OPAQUE: f64 = 1.0 / (1 << 20) as f64;
 
 /// Ambient value of every voxel, 0 = fully occluded … 1 = unobstructed. `opacity` is V_o, per `reference_mm`.
 pub fn lao(grid: &Grid, opacity: &[f32], occlusion: &Occlusion, reference_mm: f64) -> Vec<f64> {
-    each(grid.len(), |i| lao_at(grid, opacity, occlusion, reference_mm, grid.voxel(i)))
+    let rays = rays(grid, occlusion);
+    each(grid.len(), |i| along(&rays, grid, opacity, occlusion, reference_mm, grid.voxel(i)))
 }
 
 /// Ambient value of one voxel.
 pub fn lao_at(
+    grid: &Grid,
+    opacity: &[f32],
+    occlusion: &Occlusion,
+    reference_mm: f64,
+    voxel: [usize; 3],
+) -> f64 {
+    along(&rays(grid, occlusion), grid, opacity, occlusion, reference_mm, voxel)
+}
+
+/// Unit vectors in mm, as index coordinates per mm, and weights.
+pub(super) fn rays(grid: &Grid, occlusion: &Occlusion) -> Vec<([f64; 3], f64)> {
+    let unit = |v: [i32; 3]| {
+        let length = f64::from(v.map(|c| c * c).iter().sum::<i32>()).sqrt();
+        std::array::from_fn(|i| f64::from(v[i]) / length / grid.spacing[i])
+    };
+    occlusion.rays.directions().into_iter().map(|(v, weight)| (unit(v), weight)).collect()
+}
+
+/// Ambient value of one voxel along given [`rays`].
+pub(super) fn along(
+    rays: &[([f64; 3], f64)],
     grid: &Grid,
     opacity: &[f32],
     occlusion: &Occlusion,
@@ -42,14 +64,11 @@ pub fn lao_at(
     let step = f64::from(occlusion.step(grid.min_spacing()));
     let first = f64::from(occlusion.first(grid.min_spacing()));
     let mut ambient = 0.0;
-    for (direction, weight) in occlusion.rays.directions() {
-        let length = f64::from(direction.map(|c| c * c).iter().sum::<i32>()).sqrt();
+    for (direction, weight) in rays {
         // Opacity at s_m; s_0 lies one step before the first sample.
         let at = |m: u32| {
             let s = first + (f64::from(m) - 1.0) * step;
-            let position = std::array::from_fn(|i| {
-                voxel[i] as f64 + s * f64::from(direction[i]) / length / grid.spacing[i]
-            });
+            let position = std::array::from_fn(|i| voxel[i] as f64 + s * direction[i]);
             // Eight weights of 1 may sum to a little more; opacity above 1 has no logarithm.
             trilinear(grid, opacity, position).min(1.0)
         };

@@ -3,9 +3,13 @@
 //! Written from the paper, not from the shaders; not tuned, and no fallback for a missing GPU. Each file opens with
 //! its equation. Geometry that decides visibility (shape distances, depth maps) is f32, as [`crate::clip`] defines it.
 
+pub mod bricks;
+pub mod classify;
 pub mod clips;
+pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod opacity;
 pub mod peel;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
