@@ -33,7 +33,8 @@ use crate::{Error, Result};
 pub const MAX_POINTS: usize = 64;
 
 /// Preset names and what each is for. See [`TransferFunction::preset`].
-pub const PRESETS: [(&str, &str); 4] = [
+pub const PRESETS: [(&str, &str); 5] = [
+    ("auto", "ct-bone where the data look like Hounsfield units, else paper"),
     ("ct-bone", "CT: bone, all softer tissue transparent"),
     ("ct-soft", "CT: translucent skin and soft tissue over bone"),
     ("mr", "MR: brightness to opacity over the range of the data"),
@@ -124,13 +125,23 @@ impl TransferFunction {
             let problem = format!("data run from {} to {}: expected two ascending numbers", range.0, range.1);
             return Err(refused("range", problem));
         }
+        let hounsfield = range.0 < HOUNSFIELD_AIR;
         let (opacity, colour): (&[(f64, f32)], &[(f64, u32)]) = match name {
+            "auto" => return Self::preset(if hounsfield { "ct-bone" } else { "paper" }, range),
             "ct-bone" => (
                 &[(150.0, 0.0), (300.0, 0.3), (600.0, 0.8), (1500.0, 0.95)],
                 &[(150.0, 0xb5653b), (350.0, 0xe3cba0), (900.0, 0xfaf2e1), (1500.0, 0xffffff)],
             ),
             "ct-soft" => (
-                &[(-400.0, 0.0), (-150.0, 0.06), (0.0, 0.06), (80.0, 0.25), (200.0, 0.3), (400.0, 0.85)],
+                &[
+                    (-400.0, 0.0),
+                    (-200.0, 0.03),
+                    (-50.0, 0.01),
+                    (20.0, 0.015),
+                    (100.0, 0.04),
+                    (200.0, 0.15),
+                    (400.0, 0.85),
+                ],
                 &[
                     (-400.0, 0xe0a080),
                     (-50.0, 0xe8b890),
@@ -149,8 +160,8 @@ impl TransferFunction {
         let value: Box<dyn Fn(f64) -> f32> = if !name.starts_with("ct-") {
             let (low, high) = widened(range);
             Box::new(move |share| (low + share * (high - low)) as f32)
-        } else if range.0 < HOUNSFIELD_AIR {
-            Box::new(|hounsfield| hounsfield as f32)
+        } else if hounsfield {
+            Box::new(|value| value as f32)
         } else {
             let (low, high) = widened(range);
             let (air, bone) = HOUNSFIELD_WINDOW;
@@ -184,14 +195,11 @@ impl TransferFunction {
         let opacity = list("opacity", &file.opacity)?
             .iter()
             .enumerate()
-            .map(|(i, entry)| match pair(entry) {
-                Some((value, opacity)) if number(opacity).is_some() => {
-                    Ok([value as f32, number(opacity).unwrap_or_default() as f32])
-                }
-                _ => Err(refused(
-                    &format!("opacity[{i}]"),
-                    format!("{}: expected [value, opacity]", shown(entry)),
-                )),
+            .map(|(i, entry)| {
+                let key = format!("opacity[{i}]");
+                let expected = || refused(&key, format!("{}: expected [value, opacity]", shown(entry)));
+                let (value, opacity) = pair(entry).ok_or_else(expected)?;
+                Ok([value as f32, number(opacity).ok_or_else(expected)? as f32])
             })
             .collect::<Result<_>>()?;
         let colour = match &file.colour {
@@ -210,7 +218,15 @@ impl TransferFunction {
                 })
                 .collect::<Result<_>>()?,
         };
-        Self::new(opacity, colour, file.reference_mm.map(|mm| mm as f32))
+        let reference_mm = match &file.reference_mm {
+            None => None,
+            Some(value) => {
+                let expected =
+                    || refused("reference_mm", format!("{}: expected a length > 0 mm", shown(value)));
+                Some(number(value).ok_or_else(expected)? as f32)
+            }
+        };
+        Self::new(opacity, colour, reference_mm)
     }
 
     /// `spec` is the name of a [preset](Self::preset) (for data over `range`) or the path of a TOML file.
@@ -219,7 +235,7 @@ impl TransferFunction {
     /// [`Error::Config`] when it is neither; [`Error::File`] naming file and key when the file is wrong;
     /// [`Error::Io`] when it cannot be read.
     pub fn load(spec: &str, range: (f64, f64)) -> Result<Self> {
-        if PRESETS.iter().any(|(name, _)| *name == spec) {
+        if Self::is_preset(spec) {
             return Self::preset(spec, range);
         }
         let path = Path::new(spec);
@@ -227,6 +243,19 @@ impl TransferFunction {
             let problem = format!("{spec:?} is neither a file nor a preset ({})", names());
             return Err(refused("transfer", problem));
         }
+        Self::read(path)
+    }
+
+    /// Is `name` one of [`PRESETS`]?
+    pub fn is_preset(name: &str) -> bool {
+        PRESETS.iter().any(|(preset, _)| *preset == name)
+    }
+
+    /// Reads a TOML file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file and key when it is wrong.
+    pub fn read(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
         Self::from_toml(&text).map_err(|error| match error {
@@ -255,11 +284,11 @@ impl TransferFunction {
     }
 }
 
-/// The file's keys. Points stay TOML values, so that errors can say which point is wrong.
+/// The file's keys. What they hold stays TOML, so that errors can say which key and which point is wrong.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    reference_mm: Option<f64>,
+    reference_mm: Option<Value>,
     opacity: Value,
     #[serde(alias = "color")]
     colour: Value,
@@ -350,7 +379,7 @@ pub(crate) fn shown(value: &Value) -> String {
 }
 
 /// TOML tells 1 from 1.0; a user does not.
-fn number(value: &Value) -> Option<f64> {
+pub(crate) fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|i| i as f64))
 }
 

@@ -16,12 +16,18 @@ use crate::{Error, Result};
 pub const NAMES: [(&str, &str); 8] = [
     ("engine", "uint8; engine block (110) with bores, bolt holes, oil channels; liners (150), valves (230)"),
     ("fruit", "uint8; rind (200), pith (50), soft flesh (70-120), membranes (140), seeds (240), core (180)"),
-    ("skeleton", "int16, Hounsfield; spine, ribs, breastbone and pelvis of thin bone (300-1000) in soft tissue (40)"),
+    (
+        "skeleton",
+        "int16, Hounsfield; spine, ribs, breastbone and pelvis of thin bone (300-1000) in soft tissue (40)",
+    ),
     ("empty", "uint8; 0 everywhere: every ambient value is 1"),
     ("uniform", "uint8; 255 everywhere"),
     ("half-space", "uint8; 255 in the upper half along z (index >= Z/2), 0 below"),
     ("voxel", "uint8; 255 in the one voxel at index dims/2 (rounded down), 0 elsewhere"),
-    ("sheets", "uint8; 255 in every eighth slice along z (index 4, 12, ...), 0 between: thin parallel layers"),
+    (
+        "sheets",
+        "uint8; 255 in every eighth slice along z (index 4, 12, ...), 0 between: thin parallel layers",
+    ),
 ];
 
 /// Most voxels of a built-in volume (1290³).
@@ -42,7 +48,10 @@ pub fn builtin(name: &str, size: usize) -> Result<Volume> {
 /// [`Error::Limit`] above 2³¹ voxels.
 pub fn builtin_box(name: &str, dims: [usize; 3], spacing: [f64; 3]) -> Result<Volume> {
     if dims.contains(&0) {
-        return Err(refused(format!("{}x{}x{} voxels: expected at least 1 along each axis", dims[0], dims[1], dims[2])));
+        return Err(refused(format!(
+            "{}x{}x{} voxels: expected at least 1 along each axis",
+            dims[0], dims[1], dims[2]
+        )));
     }
     let voxels = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
     if voxels > MAX_VOXELS {
@@ -81,7 +90,8 @@ pub fn from_spec(spec: &str) -> Result<Volume> {
     let mut parts = spec.split(':');
     let name = parts.next().unwrap_or_default();
     let dims = numbers::<usize>(parts.next().ok_or_else(expected)?, 'x').ok_or_else(expected)?;
-    let spacing = parts.next().map_or(Some([1.0; 3]), |text| numbers::<f64>(text, ',')).ok_or_else(expected)?;
+    let spacing =
+        parts.next().map_or(Some([1.0; 3]), |text| numbers::<f64>(text, ',')).ok_or_else(expected)?;
     match parts.next() {
         None => builtin_box(name, dims, spacing),
         Some(_) => Err(expected()),
@@ -115,7 +125,10 @@ fn sampled<T: Copy + Default + Send>(dims: [usize; 3], scene: impl Fn([f64; 3], 
 }
 
 /// `value` at every index, x fastest. Each voxel is on its own, so threads share the slices.
-fn filled<T: Copy + Default + Send>([nx, ny, nz]: [usize; 3], value: impl Fn([usize; 3]) -> T + Sync) -> Vec<T> {
+fn filled<T: Copy + Default + Send>(
+    [nx, ny, nz]: [usize; 3],
+    value: impl Fn([usize; 3]) -> T + Sync,
+) -> Vec<T> {
     let mut out = vec![T::default(); nx * ny * nz];
     let threads = std::thread::available_parallelism().map_or(1, usize::from).min(nz);
     let slices = nz.div_ceil(threads);
@@ -215,8 +228,8 @@ fn engine([x, y, z]: [f64; 3], h: f64) -> f64 {
     value = over(value, 150.0, liner, h);
     let valve_x = bore_x.abs() - 0.07;
     let valve = length2(valve_x, y);
-    let disc = (valve - 0.055).max(slab(z, 0.4, 0.44));
-    let stem = (valve - 0.016).max(slab(z, 0.42, 0.85));
+    let disc = (valve - 0.065).max(slab(z, 0.37, 0.44));
+    let stem = (valve - 0.02).max(slab(z, 0.42, 0.85));
     let spring = slab(valve, 0.03, 0.045).max(slab(z, 0.6, 0.82)).max(nearest(z / 0.06) * 0.06 - z);
     nearest(over(value, 230.0, disc.min(stem).min(spring), h))
 }

@@ -7,6 +7,7 @@
 //! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header
 //! exactly (too short, too long, NaN, an unknown type) is refused with the file and the field named.
 
+pub mod builtin;
 mod values;
 
 pub use values::{Endian, Values};
