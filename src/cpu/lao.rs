@@ -12,15 +12,16 @@
 //! ```
 //!
 //! The segments run from the offset o, where q is the mean of its values at s_0 = o − Δ/2 and s_1, to s_1 (length
-//! Δ/2), and from each sample to the next (length Δ). There q counts as at least [`OPAQUE`].
+//! Δ/2), and from each sample to the next (length Δ). A segment with q below [`OPAQUE`] at both ends lets nothing
+//! through and adds nothing, the limit of its formula.
 
 use super::{Grid, each, trilinear};
 use crate::occlusion::{Occlusion, Quadrature};
 
-/// Least q = 1 − a of the segment rule. λ grows without bound as q → 0, so the rounding of eight interpolation
-/// weights, 1e-16 here and 6e-8 in a shader, would decide whether an opaque segment adds 0 or a twentieth of its
-/// length. With this floor it adds 1/(20 ln 2) = 0.07 of a step, and both precisions agree.
-pub const OPAQUE: f64 = 1.0 / (1 << 20) as f64;
+/// Below this q = 1 − a counts as 0 where both ends of a segment are. λ grows without bound as q → 0, so the rounding
+/// of eight interpolation weights, 1e-16 here and 6e-8 in a shader, would otherwise decide whether an opaque segment
+/// adds nothing or a twentieth of its length.
+pub const OPAQUE: f64 = 1e-6;
 
 /// Ambient value of every voxel, 0 = fully occluded … 1 = unobstructed. `opacity` is V_o, per `reference_mm`.
 pub fn lao(grid: &Grid, opacity: &[f32], occlusion: &Occlusion, reference_mm: f64) -> Vec<f64> {
@@ -110,6 +111,9 @@ fn segment(samples: u32, ratio: f64, opacity: impl Fn(u32) -> f64) -> f64 {
     for m in 1..=samples {
         let q1 = if m == 1 { second } else { 1.0 - opacity(m) };
         let length = if m == 1 { 0.5 } else { 1.0 };
+        if q0.max(q1) < OPAQUE {
+            break;
+        }
         let depth = length * ratio * mean_extinction(q0, q1);
         sum += length * transmittance * mean_transmittance(depth);
         transmittance *= (-depth).exp();
@@ -118,9 +122,8 @@ fn segment(samples: u32, ratio: f64, opacity: impl Fn(u32) -> f64) -> f64 {
     sum / (f64::from(samples) - 0.5)
 }
 
-/// λ, the mean of −ln q over q from q0 to q1, each in [0, 1] and counted as at least [`OPAQUE`].
+/// λ, the mean of −ln q over q from q0 to q1, each in [0, 1], not both 0.
 fn mean_extinction(q0: f64, q1: f64) -> f64 {
-    let (q0, q1) = (q0.max(OPAQUE), q1.max(OPAQUE));
     let mean = (q0 + q1) / 2.0;
     let half = (q1 - q0) / 2.0;
     if half.abs() <= 1e-3 * mean {
@@ -128,7 +131,8 @@ fn mean_extinction(q0: f64, q1: f64) -> f64 {
         let d = half / mean;
         return d * d / 6.0 + d.powi(4) / 20.0 - mean.ln();
     }
-    1.0 - (q1 * q1.ln() - q0 * q0.ln()) / (q1 - q0)
+    let entropy = |q: f64| if q > 0.0 { q * q.ln() } else { 0.0 };
+    1.0 - (entropy(q1) - entropy(q0)) / (q1 - q0)
 }
 
 /// (1 − e^−x)/x, the mean transmittance over an optical depth x.
@@ -181,10 +185,8 @@ mod tests {
         match quadrature {
             Quadrature::Left => (1.0 - q.powf(m)) / (m * (1.0 - q)),
             Quadrature::Cell => (1.0 - q.powf(m)) / (m * (1.0 - q)) * (1.0 + q) / 2.0,
-            Quadrature::Segment => {
-                let q = q.max(OPAQUE);
-                (1.0 - q.powf(m - 0.5)) / (-(m - 0.5) * q.ln())
-            }
+            Quadrature::Segment if q == 0.0 => 0.0,
+            Quadrature::Segment => (1.0 - q.powf(m - 0.5)) / (-(m - 0.5) * q.ln()),
         }
     }
 
@@ -247,13 +249,10 @@ mod tests {
             |quadrature| lao_at(&grid, &opacity, &settings(RaySet::R6, quadrature, 5.0), 1.0, [7, 7, 7]);
         close(value(Quadrature::Left), (5.0 + 1.0 / 5.0) / 6.0, "left");
         close(value(Quadrature::Cell), (5.0 + 0.5 / 5.0) / 6.0, "cell");
-        // Half a step with q from ½ to 0: λ = 1 − ln ½; then opaque, λ = 20 ln 2.
-        let ln2 = 2.0_f64.ln();
-        let depth = 0.5 * (1.0 + ln2);
-        let up = 0.5 * (1.0 - (-depth).exp()) / depth + (-depth).exp() / (20.0 * ln2);
-        let found = value(Quadrature::Segment);
-        // The floor of q changes the first λ by 20 ln 2 · 2^-20 / ½, less than 1e-4.
-        assert!((found - (5.0 + up / 4.5) / 6.0).abs() < 1e-6, "segment: {found}");
+        // Half a step with q from ½ to 0: λ = 1 − ln ½. The next segment is opaque at both ends and adds nothing.
+        let depth = 0.5 * (1.0 + 2.0_f64.ln());
+        let up = 0.5 * (1.0 - (-depth).exp()) / depth;
+        close(value(Quadrature::Segment), (5.0 + up / 4.5) / 6.0, "segment");
     }
 
     /// Opacity a in z ≥ 8 on all ray sets: the trilinear opacity at height h above the eye is a·clamp(h, 0, 1).
@@ -377,12 +376,17 @@ mod tests {
             let brute: f64 =
                 (0..n).map(|i| -(q0 + (q1 - q0) * (f64::from(i) + 0.5) / f64::from(n)).ln()).sum::<f64>()
                     / f64::from(n);
-            // From 1 to 0 the floor costs OPAQUE · 20 ln 2 = 1.3e-5 of λ.
-            assert!((mean_extinction(q0, q1) - brute).abs() < 2e-5, "{q0} {q1}");
+            assert!((mean_extinction(q0, q1) - brute).abs() < 1e-5, "{q0} {q1}");
         }
         assert_eq!(mean_extinction(1.0, 1.0), 0.0);
-        // Rounding of an opaque sample does not show.
-        assert_eq!(mean_extinction(0.0, 1e-16), 20.0 * 2.0_f64.ln());
+    }
+
+    /// Opacity 1 that interpolation has rounded is opacity 1.
+    #[test]
+    fn rounding_of_opaque_samples_does_not_show() {
+        for below in [0.0, 1e-16, 6e-8] {
+            assert_eq!(segment(6, 1.0, |_| 1.0 - below), 0.0);
+        }
     }
 
     /// A rule's value against the integral that it approximates, from the offset over the length that it normalises
