@@ -9,8 +9,11 @@ pub mod clips;
 pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod occupancy;
 pub mod opacity;
 pub mod peel;
+pub mod raycast;
+pub mod ssao;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
