@@ -209,7 +209,15 @@ fn bad(path: &Path, field: &str, problem: impl Into<String>) -> Error {
 fn assemble(path: &Path, dims: [usize; 3], grid: Grid, values: Values, scale: (f64, f64)) -> Result<Volume> {
     check_finite(dims, &values).map_err(|p| bad(path, "data", p))?;
     let Grid { spacing, origin, directions, space } = grid;
-    Ok(Volume { dims, spacing, origin, directions, space, values, slope: scale.0, intercept: scale.1 })
+    let (slope, intercept) = scale;
+    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept };
+    if scale != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
+        let problem = format!(
+            "slope {slope} and intercept {intercept} lead beyond all numbers, expected finite values"
+        );
+        return Err(bad(path, "data", problem));
+    }
+    Ok(volume)
 }
 
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
