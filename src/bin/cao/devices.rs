@@ -1,0 +1,19 @@
+//! `cao devices`: what can be rendered on.
+
+use crate::args::Global;
+use crate::output::Out;
+use anyhow::Result;
+use cao::gpu::Gpu;
+use std::process::ExitCode;
+
+pub fn run(global: &Global) -> Result<ExitCode> {
+    let mut out = Out::new(global);
+    let devices = Gpu::list()?;
+    for (i, device) in devices.iter().enumerate() {
+        out.line(format!("{i}  {device}"));
+    }
+    let json = devices.iter().map(|d| serde_json::json!({ "name": d.name, "driver": d.driver }));
+    out.json(serde_json::json!({ "devices": json.collect::<Vec<_>>() }));
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,234 @@
+# shellcheck shell=bash
+# Set-up shared by tools/demo, tools/test, tools/get-data and .ci/run; sourced, not run.
+#
+# It looks first and installs only what is missing, so a second run touches no package manager. Progress goes to
+# stderr in short lines; a package manager's own output is shown only when it fails.
+
+say() { printf '%s: %s\n' "${0##*/}" "$*" >&2; }
+stop() {
+  say "$*"
+  exit 1
+}
+have() { command -v "$1" >/dev/null 2>&1; }
+
+# --- packages ---------------------------------------------------------------------------------------------------------
+
+# What a need is called where: need, Debian and Ubuntu, Fedora, Arch.
+packages_of() { # need, column 2…4
+  awk -v need="$1" -v column="$2" '$1 == need { gsub(",", " ", $column); print $column }' <<'TABLE'
+linker        gcc,libc6-dev            gcc                       gcc
+certificates  ca-certificates          ca-certificates           ca-certificates
+loader        libvulkan1               vulkan-loader             vulkan-icd-loader
+driver        mesa-vulkan-drivers      mesa-vulkan-drivers       vulkan-swrast
+validation    vulkan-validationlayers  vulkan-validation-layers  vulkan-validation-layers
+spirv         spirv-tools              spirv-tools               spirv-tools
+TABLE
+}
+
+packages() { # column, needs…
+  local column=$1 need
+  shift
+  for need; do packages_of "$need" "$column"; done | paste -s -d ' '
+}
+
+# Runs a command as root, or fails: directly, or by a sudo that asks for nothing.
+as_root() {
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+}
+may_install() { [ "$(id -u)" = 0 ] || { have sudo && sudo -n true 2>/dev/null; }; }
+
+# Runs a command silently; shows what it printed only if it fails.
+quietly() {
+  local log status=0
+  log=$(mktemp)
+  "$@" >"$log" 2>&1 </dev/null || status=$?
+  [ "$status" = 0 ] || tail -n 20 "$log" >&2
+  rm -f "$log"
+  return "$status"
+}
+
+apt() {
+  as_root env DEBIAN_FRONTEND=noninteractive \
+    apt-get -q -y -o Dpkg::Use-Pty=0 -o DPkg::Lock::Timeout=120 --no-install-recommends "$@"
+}
+
+apt_refreshed=
+apt_refresh() {
+  [ -z "$apt_refreshed" ] || return 0
+  say "refreshing the package lists"
+  # One unreachable third-party source must not end the set-up; the install that follows says what it lacks.
+  quietly apt update || say "some package lists could not be refreshed; going on with what is there"
+  apt_refreshed=yes
+}
+
+# Says in one line what is missing and how to get it; ends the script.
+stop_missing() { # needs…
+  if have apt-get; then
+    stop "missing: $*; as root run: apt-get update && apt-get install $(packages 2 "$@")"
+  fi
+  stop "missing: $*; Fedora: dnf install $(packages 3 "$@"); Arch: pacman -S $(packages 4 "$@")"
+}
+
+install() { # needs…
+  if ! have apt-get || ! may_install; then stop_missing "$@"; fi
+  apt_refresh
+  local wanted
+  read -r -a wanted <<<"$(packages 2 "$@")"
+  say "installing ${wanted[*]}"
+  quietly apt install "${wanted[@]}" || stop_missing "$@"
+}
+
+# --- what is there ----------------------------------------------------------------------------------------------------
+
+has_linker() { have cc; }
+
+# Cargo needs certificates to fetch the dependencies; a variable may name some that are not the system's.
+has_certificates() {
+  [ -n "${CARGO_HTTP_CAINFO:-}${SSL_CERT_FILE:-}${SSL_CERT_DIR:-}" ] ||
+    [ -e /etc/ssl/certs/ca-certificates.crt ] || [ -e /etc/pki/tls/certs/ca-bundle.crt ] || [ -e /etc/ssl/cert.pem ]
+}
+
+has_loader() {
+  local ldconfig=ldconfig directory
+  have ldconfig || ldconfig=/sbin/ldconfig # not on a Debian user's PATH
+  "$ldconfig" -p 2>/dev/null | grep -q 'libvulkan\.so\.1' && return 0
+  while read -r -d : directory; do
+    if [ -n "$directory" ] && [ -e "$directory/libvulkan.so.1" ]; then return 0; fi
+  done <<<"${LD_LIBRARY_PATH:-}:"
+  return 1
+}
+
+has_validation() {
+  local layers directory
+  layers="${VK_LAYER_PATH:-}:${VK_ADD_LAYER_PATH:-}:${VULKAN_SDK:-/usr}/share/vulkan/explicit_layer.d"
+  layers+=":/usr/share/vulkan/explicit_layer.d:/usr/local/share/vulkan/explicit_layer.d:/etc/vulkan/explicit_layer.d"
+  layers+=":${XDG_DATA_HOME:-${HOME:-}/.local/share}/vulkan/explicit_layer.d:"
+  while read -r -d : directory; do
+    if [ -n "$directory" ] && [ -e "$directory/VkLayer_khronos_validation.json" ]; then return 0; fi
+  done <<<"$layers"
+  return 1
+}
+
+has_spirv() { have spirv-val; }
+
+# Ends the script unless a Rust is there that can build this package.
+require_rust() {
+  local wanted found
+  if ! have cargo && [ -x "${CARGO_HOME:-${HOME:-}/.cargo}/bin/cargo" ]; then
+    PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
+  fi
+  wanted=$(sed -n 's/^rust-version *= *"\(.*\)"/\1/p' Cargo.toml)
+  have cargo || stop "missing: Rust $wanted or later (cargo); how to get it: https://rustup.rs"
+  found=$(rustc --version | cut -d ' ' -f 2)
+  if [ "$(printf '%s\n' "$wanted" "$found" | sort -V | head -n 1)" != "$wanted" ]; then
+    stop "Rust $found is too old, $wanted or later is needed; how to get it: rustup update, or https://rustup.rs"
+  fi
+}
+
+# Installs whichever of the given needs are not there.
+setup() { # needs…
+  local need missing=()
+  require_rust
+  for need; do
+    "has_$need" || missing+=("$need")
+  done
+  [ "${#missing[@]}" = 0 ] || install "${missing[@]}"
+}
+
+# --- the program and a device -----------------------------------------------------------------------------------------
+
+# Cargo's progress belongs on a terminal; in a pipe only its errors do.
+quiet_cargo=()
+[ -t 2 ] || quiet_cargo=(--quiet)
+
+build() {
+  say "building (the first time takes some minutes)"
+  cargo build "${quiet_cargo[@]}" --release --locked --bin cao
+}
+
+# Runs the program that build made.
+cao() { cargo run --quiet --release --locked --bin cao -- "$@"; }
+
+# Sees to it that some Vulkan device answers; after build, because the program itself is asked.
+setup_device() {
+  if cao devices >/dev/null 2>&1; then return 0; fi
+  if have apt-get && may_install; then
+    say "no Vulkan device answers; a software driver will do"
+    install_software_driver
+  else
+    stop_missing driver
+  fi
+  # Now let it speak: the reason is the user's only clue.
+  cao devices >/dev/null || stop "no Vulkan device answers, not even the software driver just installed"
+}
+
+# Mesa's software driver runs this program's kernels about three times faster from version 25 on, so an older
+# candidate is passed over if the distribution's backports have a newer one.
+install_software_driver() {
+  apt_refresh
+  local candidate
+  candidate=$(apt-cache policy mesa-vulkan-drivers | awk '$1 == "Candidate:" { print $2 }')
+  if dpkg --compare-versions "${candidate:-0}" lt 25 && install_driver_from_backports; then return 0; fi
+  install driver
+}
+
+install_driver_from_backports() {
+  local suite added=
+  suite=$(. /etc/os-release && [ "${ID:-}" = debian ] && echo "${VERSION_CODENAME:-}-backports")
+  [ -n "$suite" ] && [ "$suite" != -backports ] || return 1
+  if ! apt_knows "$suite"; then
+    added=$(add_backports "$suite") || return 1
+  fi
+  if apt_knows "$suite" && say "installing mesa-vulkan-drivers from $suite" &&
+    quietly apt install -t "$suite" mesa-vulkan-drivers; then
+    return 0
+  fi
+  say "$suite has no driver to install; taking the default one"
+  [ -z "$added" ] || as_root rm -f "$added"
+  return 1
+}
+
+# Whether a suite's package lists are there: configured and fetched.
+# shellcheck disable=SC2016 # the $(…) are apt's
+apt_knows() { # suite
+  [ -n "$(apt-get indextargets --format '$(REPO_URI)' \
+    'Created-By: Packages' "Codename: $1" 'Origin: Debian Backports')" ]
+}
+
+# Adds the backports suite beside the distribution's own source, copying whatever that source says (address, key,
+# components, options), so that a mirror stays a mirror. Prints the file it made; leaves none behind on failure.
+# shellcheck disable=SC2016 # the $(…) are apt's
+add_backports() { # suite
+  local entry file number made text
+  entry=$(apt-get indextargets --format '$(SOURCESENTRY)' \
+    'Created-By: Packages' "Codename: ${1%-backports}" 'Origin: Debian' 'Component: main' | head -n 1)
+  # The number counts stanzas in a deb822 file, lines in a classic one.
+  file=${entry%:*} number=${entry##*:}
+  [ -r "$file" ] || return 1
+  made=/etc/apt/sources.list.d/cao-backports.${file##*.}
+  case $file in
+  *.sources) text=$(stanza_for_suite "$file" "$number" "$1") ;;
+  *) text=$(sed -n "${number}p" "$file" | sed -E "s/^(deb +(\[[^]]*\] +)?[^ ]+ +)[^ ]+/\1$1/") ;;
+  esac
+  say "adding $1 as $made"
+  as_root tee "$made" <<<"$text" >/dev/null || return 1
+  # Only the new file is read: fast, and no other source can make this fail.
+  if quietly apt update -o Dir::Etc::SourceList="$made" -o Dir::Etc::SourceParts=/dev/null \
+    -o APT::Get::List-Cleanup=0 -o APT::Update::Error-Mode=any; then
+    echo "$made"
+  else
+    as_root rm -f "$made"
+    return 1
+  fi
+}
+
+# Prints the n-th deb822 stanza of a file with its suites replaced, without comments.
+stanza_for_suite() { # file, n, suite
+  awk -v n="$2" -v suite="$3" '
+    /^#/ { next }
+    /^[ \t]*$/ { if (inside) stanzas++; inside = 0; next }
+    { inside = 1 }
+    !/^[ \t]/ { of_suites = tolower($0) ~ /^suites:/; if (of_suites) $0 = "Suites: " suite }
+    /^[ \t]/ && of_suites { next } # suites on further lines
+    stanzas == n - 1' "$1"
+}
