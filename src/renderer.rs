@@ -13,8 +13,8 @@ use crate::gpu::{
 };
 use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
 use crate::method::{cao, lao};
-use crate::scene::Method;
 use crate::occlusion::Occlusion;
+use crate::scene::Method;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
 use crate::stage::compare::{Compare, Difference};
@@ -264,9 +264,7 @@ impl Renderer {
             timings.extend(rec.submit_and_wait()?);
             if self.setup.method == Method::Lao {
                 let (from, to) = (&volumes.opacity, &volumes.ambient);
-                timings.extend(lao::run(
-                    &self.gpu, field, kernels, volumes, &settings, from, to, progress,
-                )?);
+                timings.extend(lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?);
             }
         }
         self.updated();
@@ -290,12 +288,7 @@ impl Renderer {
                 &[Access::StorageWrite, Access::SampledRead],
             );
             rec.stage("opacity")?;
-            self.opacity.record(
-                rec,
-                &self.field,
-                &self.transfer_buffer,
-                &self.volumes.full_opacity,
-            )?;
+            self.opacity.record(rec, &self.field, &self.transfer_buffer, &self.volumes.full_opacity)?;
             rec.end_stage()?;
             rec.stage("occupancy")?;
             self.occupancy.record(rec, &self.field, &self.transfer_buffer, &self.volumes.occupancy)?;
@@ -310,7 +303,7 @@ impl Renderer {
         rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(&self.volumes.changed_before, 0, self.volumes.changed_before.bytes(), 1)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-    Ok(())
+        Ok(())
     }
 
     fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
@@ -339,7 +332,7 @@ impl Renderer {
             &[Access::StorageWrite],
             &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
         );
-    Ok(())
+        Ok(())
     }
 
     /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). The ambient volume must be up to date.
@@ -366,16 +359,11 @@ impl Renderer {
         };
         self.raycast.record(rec, bindings, colour, depth, size)?;
         rec.end_stage()?;
-    Ok(())
+        Ok(())
     }
 
     /// Draws both eyes on the device's own queue and reads them back.
-    pub fn draw(
-        &self,
-        views: &[View; 2],
-        look: &Look,
-        size: [u32; 2],
-    ) -> Result<(StereoImage, Timings)> {
+    pub fn draw(&self, views: &[View; 2], look: &Look, size: [u32; 2]) -> Result<(StereoImage, Timings)> {
         if size.contains(&0) {
             return Err(Error::Config {
                 what: "image size".into(),

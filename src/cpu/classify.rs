@@ -19,12 +19,13 @@ pub const AFFECTED: u8 = 1;
 pub const UNTOUCHED: u8 = 2;
 
 /// Sample positions in half voxels from the centre: the centre, the 8 corners, and `more` points of Roberts'
-/// Kronecker sequence, u_k = frac(½ + k·(1/g, 1/g², 1/g³)) with g⁴ = g + 1, position 2u − 1.
+/// Kronecker sequence, u_k = frac(½ + k·(1/g, 1/g², 1/g³)) with g⁴ = g + 1, position 2u − 1, each followed by its
+/// mirror image, so that their mean is the centre.
 pub fn sample_positions(more: u32) -> Vec<[f64; 3]> {
     const G: f64 = 1.220_744_084_605_759_6;
     let corners = (0..8_u32).map(|i| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 }));
-    let sequence =
-        (1..=more).map(|k| [1, 2, 3].map(|power| 2.0 * (0.5 + f64::from(k) / G.powi(power)).fract() - 1.0));
+    let place = |k: u32| [1, 2, 3].map(|power| 2.0 * (0.5 + f64::from(k) / G.powi(power)).fract() - 1.0);
+    let sequence = (1..=more / 2).map(place).flat_map(|p| [p, p.map(|c| -c)]);
     std::iter::once([0.0; 3]).chain(corners).chain(sequence).collect()
 }
 
@@ -107,9 +108,9 @@ pub(super) mod tests {
         corners.dedup();
         assert_eq!(corners.len(), 8);
         assert!(positions[9..].iter().flatten().all(|c| c.abs() < 1.0));
-        // Evenly spread: the mean is near the centre (0.144 along y, the worst), and each octant has some.
+        // Evenly spread: the mean is the centre, and each octant has some.
         for axis in 0..3 {
-            assert!((positions[9..].iter().map(|p| p[axis]).sum::<f64>() / 32.0).abs() < 0.15);
+            assert_eq!(positions[9..].iter().map(|p| p[axis]).sum::<f64>(), 0.0);
         }
         for octant in &positions[1..9] {
             let same = |p: &&[f64; 3]| (0..3).all(|i| p[i] * octant[i] > 0.0);

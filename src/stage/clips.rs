@@ -7,7 +7,7 @@
 use super::dilate::Dilate;
 use super::peel::{Layers, MAX_PAIRS, Peel};
 use crate::clip::{Clip, ClipCamera, Mode, Shape};
-use crate::gpu::{shaders, Access, Buffer, BufferUse, Gpu, Recorder};
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
 use crate::layout_check;
 use crate::mesh::TriangleMesh;
 use crate::{Error, Result};
@@ -71,9 +71,19 @@ impl MapSettings {
         if !(8..=4096).contains(&self.resolution) {
             return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
         }
-        if self.cells == 0 || self.resolution % self.cells != 0 || (self.literal && self.cells != self.resolution) {
-            let wanted = if self.literal { "the depth map's resolution" } else { "a divisor of the depth map's resolution" };
-            return refuse("dilation map resolution", format!("{}; expected {wanted}, {}", self.cells, self.resolution));
+        if self.cells == 0
+            || self.resolution % self.cells != 0
+            || (self.literal && self.cells != self.resolution)
+        {
+            let wanted = if self.literal {
+                "the depth map's resolution"
+            } else {
+                "a divisor of the depth map's resolution"
+            };
+            return refuse(
+                "dilation map resolution",
+                format!("{}; expected {wanted}, {}", self.cells, self.resolution),
+            );
         }
         if !(1..=MAX_PAIRS).contains(&self.pairs) {
             return refuse("layer pairs", format!("{}; expected 1 … {MAX_PAIRS}", self.pairs));
@@ -213,7 +223,10 @@ impl ClipSet {
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
         let mut rec = gpu.recorder("dilate")?;
         for mesh in &self.meshes {
-            rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+            rec.barrier(
+                &[Access::StorageRead, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
             dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
         }
         rec.submit_and_wait()?;
@@ -258,7 +271,7 @@ impl ClipSet {
         rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
-    Ok(())
+        Ok(())
     }
 }
 

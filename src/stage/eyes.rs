@@ -1,7 +1,7 @@
 //! Eyes and frame settings on the device (`spirv/shared/eyes.wgsl`).
 
 use super::field::Field;
-use crate::gpu::{shaders, Access, Buffer, BufferUse, Gpu, Recorder};
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
 use crate::layout_check;
 use crate::view::View;
 use crate::{Error, Result};
@@ -34,10 +34,10 @@ struct Frame {
     scale: f32,
     occluded: f32,
     jitter: f32,
-    pad: f32,
+    gain: f32,
 }
 layout_check!(Frame => shaders::raycast::FRAME {
-    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, pad
+    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, gain
 });
 
 /// How samples are lit and where they lie.
@@ -53,6 +53,9 @@ pub struct Look {
     pub step_mm: Option<f32>,
     /// Opacity at which a ray ends.
     pub opaque: f32,
+    /// The ambient factor is shown times this. A flat wall's is 1/2, so that 2 shows it at full light; the paper's authors do
+    /// the same.
+    pub gain: f32,
     /// Whether samples start at another fraction of a step in every pixel, against banding.
     pub jitter: bool,
     /// Whether the ambient factor is shown; without it the picture is the paper's "solid colour".
@@ -67,6 +70,7 @@ impl Default for Look {
             light: Vec3::new(-0.4, -0.7, 0.6),
             step_mm: None,
             opaque: 0.99,
+            gain: 2.0,
             jitter: true,
             occluded: true,
         }
@@ -76,7 +80,11 @@ impl Default for Look {
 impl Look {
     fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
-        for (what, value) in [("shading.ambient", self.ambient), ("shading.diffuse", self.diffuse)] {
+        for (what, value) in [
+            ("shading.ambient", self.ambient),
+            ("shading.diffuse", self.diffuse),
+            ("shading.gain", self.gain),
+        ] {
             if !(value.is_finite() && value >= 0.0) {
                 return refuse(what, format!("{value}; expected a number >= 0"));
             }
@@ -142,10 +150,11 @@ impl FrameBuffer {
         data.bias = field.bias;
         data.scale = field.scale;
         data.occluded = f32::from(u8::from(look.occluded));
+        data.gain = look.gain;
         data.jitter = f32::from(u8::from(look.jitter));
         rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);
-    Ok(())
+        Ok(())
     }
 }

@@ -7,8 +7,8 @@
 
 use crate::clip::ClipCamera;
 use crate::gpu::{
-    shaders, Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc, ImageKind,
-    ImageUse, Pipeline,
+    Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc,
+    ImageKind, ImageUse, Pipeline, shaders,
 };
 use crate::layout_check;
 use crate::mesh::TriangleMesh;
@@ -118,7 +118,12 @@ impl Peel {
                     pipeline,
                     &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
                     bytemuck::bytes_of(&params),
-                    Attachments { colours: &[], depth: Some((&now, Some(1.0))), layer: None, size: [edge, edge] },
+                    Attachments {
+                        colours: &[],
+                        depth: Some((&now, Some(1.0))),
+                        layer: None,
+                        size: [edge, edge],
+                    },
                     corners.len() as u32,
                 )?;
                 rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
@@ -137,7 +142,11 @@ impl Peel {
 
         let empty = vec![1.0; (edge * edge) as usize];
         let layer = |side: usize, pair: usize| maps[side].get(pair).unwrap_or(&empty);
-        let depth = (0..pairs as usize).flat_map(|pair| [layer(0, pair), layer(1, pair)]).flatten().copied().collect();
+        let depth = (0..pairs as usize)
+            .flat_map(|pair| [layer(0, pair), layer(1, pair)])
+            .flatten()
+            .copied()
+            .collect();
         Ok(Layers { camera, pairs, depth })
     }
 }
@@ -156,7 +165,12 @@ fn depth_image(gpu: &Gpu, edge: u32) -> Result<Image> {
 }
 
 /// Number of pairs, or what is wrong and where.
-fn check(mesh: &TriangleMesh, [fronts, backs]: &[Vec<Vec<f32>>; 2], edge: u32, max_pairs: u32) -> Result<u32> {
+fn check(
+    mesh: &TriangleMesh,
+    [fronts, backs]: &[Vec<Vec<f32>>; 2],
+    edge: u32,
+    max_pairs: u32,
+) -> Result<u32> {
     let refuse = |problem| Err(Error::Mesh { name: mesh.name.clone(), problem });
     let found = fronts.len().max(backs.len());
     if found > max_pairs as usize {
@@ -174,9 +188,8 @@ fn check(mesh: &TriangleMesh, [fronts, backs]: &[Vec<Vec<f32>>; 2], edge: u32, m
         return refuse("no face is seen by the clip camera; expected a closed mesh with a volume".into());
     }
     let at = |maps: &[Vec<f32>], layer: usize, pixel: usize| maps.get(layer).map_or(1.0, |map| map[pixel]);
-    let mut odd = (0..(edge * edge) as usize).filter(|&pixel| {
-        (0..found).any(|k| (at(fronts, k, pixel) < 1.0) != (at(backs, k, pixel) < 1.0))
-    });
+    let mut odd = (0..(edge * edge) as usize)
+        .filter(|&pixel| (0..found).any(|k| (at(fronts, k, pixel) < 1.0) != (at(backs, k, pixel) < 1.0)));
     if let Some(first) = odd.next() {
         return refuse(format!(
             "front and back layers differ in number at {} of {} pixels of the clip camera, first at ({}, {}): the mesh is open or \

@@ -107,13 +107,13 @@ pub struct Settings {
     #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
     pub quadrature: Option<Quadrature>,
     /// Radius of the neighbourhood in mm [default: 20 of the smallest spacing]
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub radius_mm: Option<f32>,
     /// Distance in mm at which rays start [default: half a step]
-    #[arg(long, value_name = "O")]
+    #[arg(long, value_name = "O", allow_negative_numbers = true)]
     pub offset_mm: Option<f32>,
     /// Distance in mm between samples [default: the smallest spacing]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub step_mm: Option<f32>,
     /// lao computes everything again, cao only what a clip changed
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s))]
@@ -160,10 +160,10 @@ pub struct Render {
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub elevation: Option<f32>,
     /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub distance: Option<f32>,
     /// Distance between the eyes in mm
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub ipd: Option<f32>,
     /// Draw without ambient occlusion
     #[arg(long)]

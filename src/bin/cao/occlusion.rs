@@ -15,7 +15,8 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let clips = args::clips(matches)?;
     let volume = args.raw.open(&args.input)?;
     let setup = setup(&args.settings, &volume, Method::Lao, !args.needed_only)?;
-    let transfer = TransferFunction::load(args.settings.transfer.as_deref().unwrap_or("auto"), volume.range())?;
+    let transfer =
+        TransferFunction::load(args.settings.transfer.as_deref().unwrap_or("auto"), volume.range())?;
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&clips)?;

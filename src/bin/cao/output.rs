@@ -93,7 +93,10 @@ impl Out {
     pub fn memory(&mut self, gpu: &Gpu, volume: &Volume) {
         let peak = gpu.memory_peak();
         let per_voxel = peak as f64 / volume.len() as f64;
-        self.line(format!("memory    {:.1} MiB at peak, {per_voxel:.1} bytes a voxel", peak as f64 / 1048576.0));
+        self.line(format!(
+            "memory    {:.1} MiB at peak, {per_voxel:.1} bytes a voxel",
+            peak as f64 / 1048576.0
+        ));
         self.json(json!({ "memory_peak_bytes": peak }));
     }
 
@@ -118,8 +121,7 @@ impl Out {
 
     /// Prints. A pipe whose reader has left is no failure.
     pub fn finish(self) -> Result<()> {
-        let text =
-            if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
+        let text = if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
         match std::io::stdout().write_all(text.as_bytes()) {
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             other => other.context("cannot write to standard output"),

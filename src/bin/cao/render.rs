@@ -114,10 +114,8 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
 fn write<'a>(args: &'a Render, image: &StereoImage, background: [f32; 3]) -> Result<Vec<&'a Path>> {
     let [width, height] = image.size;
     let [left, right] = &image.colour;
-    let (left, right) = (
-        Picture::over(width, height, left, background),
-        Picture::over(width, height, right, background),
-    );
+    let (left, right) =
+        (Picture::over(width, height, left, background), Picture::over(width, height, right, background));
     let mut written = Vec::new();
     if let Some(path) = &args.output {
         Picture::beside(&left, &right).write_png(path)?;

@@ -14,12 +14,8 @@ use serde_json::json;
 use std::process::ExitCode;
 
 /// The built-in scenes, at a size that takes seconds each; the last has anisotropic spacing.
-const BUILT_IN: [&str; 4] = [
-    "builtin:engine:40",
-    "builtin:fruit:32",
-    "builtin:skeleton:40",
-    "builtin:engine:40x36x20:1,1,2",
-];
+const BUILT_IN: [&str; 4] =
+    ["builtin:engine:40", "builtin:fruit:32", "builtin:skeleton:40", "builtin:engine:40x36x20:1,1,2"];
 
 pub fn run(global: &Global, args: &Verify, _: &ArgMatches) -> Result<ExitCode> {
     if args.poses == 0 {
