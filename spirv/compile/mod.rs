@@ -11,6 +11,7 @@ use include::Source;
 use reflect::Shader;
 
 use naga::{
+    Module, ResourceBinding,
     back::spv,
     proc::{BoundsCheckPolicies, BoundsCheckPolicy},
     valid::{Capabilities, ValidationFlags, Validator},
@@ -72,7 +73,7 @@ pub fn source(name: &str, source: &Source, options: Options) -> Result<Shader, S
         let lines: Vec<_> = problems.iter().map(|(span, text)| diagnose::at(source, *span, text)).collect();
         return Err(lines.join("\n"));
     }
-    let spirv = spv::write_vec(&module, &info, &spirv_options(options), None)
+    let spirv = spv::write_vec(&module, &info, &spirv_options(&module, options), None)
         .map_err(|e| format!("error: {}: cannot be written as SPIR-V: {e}", source.name()))?;
     reflect::reflect(name, &module, &info, spirv).map_err(|e| format!("error: {}: {e}", source.name()))
 }
@@ -95,7 +96,12 @@ pub fn folder(folder: &Path, options: Options) -> Result<String, Vec<String>> {
 /// * workgroup memory is not zeroed (250 times slower on lavapipe): shaders write before they read;
 /// * no checks of divisors and no bounds on loops: the shaders are tested;
 /// * no 16-bit input and output, which lavapipe lacks.
-fn spirv_options(options: Options) -> spv::Options<'static> {
+fn spirv_options(module: &Module, options: Options) -> spv::Options<'static> {
+    // A binding keeps the number it has in the source; without faked bindings, naga wants that said.
+    let bindings = module.global_variables.iter().filter_map(|(_, variable)| variable.binding);
+    let identity = |b: ResourceBinding| {
+        (b, spv::BindingInfo { descriptor_set: b.group, binding: b.binding, binding_array_size: None })
+    };
     let bounds = match options.bounds {
         Bounds::Unchecked => BoundsCheckPolicies {
             index: BoundsCheckPolicy::Unchecked,
@@ -114,6 +120,7 @@ fn spirv_options(options: Options) -> spv::Options<'static> {
         lang_version: (1, 3),
         flags: if options.debug { spv::WriterFlags::DEBUG } else { spv::WriterFlags::empty() },
         fake_missing_bindings: false,
+        binding_map: bindings.map(identity).collect(),
         bounds_check_policies: bounds,
         zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::None,
         force_loop_bounding: false,

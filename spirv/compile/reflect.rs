@@ -1,12 +1,12 @@
 //! What the host needs to know about a shader, taken from naga's module. Mirrors `src/gpu/shader.rs`, which holds it at run time.
 
 use naga::{
-    AddressSpace, Block, Expression, Function, GlobalVariable, Handle, ImageClass, ImageDimension, Module,
-    ScalarKind, ShaderStage, Statement, StorageAccess, StorageFormat, TypeInner,
+    AddressSpace, GlobalVariable, Handle, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage,
+    StorageFormat, TypeInner,
     proc::Layouter,
     valid::{GlobalUse, ModuleInfo},
 };
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// One compiled file.
 #[derive(Debug)]
@@ -129,7 +129,6 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
         }
     }
     bindings.sort_by_key(|(_, b)| (b.group, b.binding));
-    let passed = passed_to_functions(module);
     let mut entry_points = Vec::new();
     for (i, entry) in module.entry_points.iter().enumerate() {
         let used = info.get_entry_point(i);
@@ -138,8 +137,11 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
             if used[*handle].is_empty() {
                 continue;
             }
-            let variable = &module.global_variables[*handle];
-            let (reads, writes) = access(module, variable, used[*handle], passed.contains(handle));
+            let used = used[*handle];
+            let atomic = used.contains(GlobalUse::ATOMIC);
+            // Uses inside called functions are included. naga refuses stores through a function's image parameter.
+            let reads = atomic || used.contains(GlobalUse::READ);
+            let writes = atomic || used.contains(GlobalUse::WRITE);
             binding.reads |= reads;
             binding.writes |= writes;
             uses.push(Use { binding: index, reads, writes });
@@ -167,53 +169,6 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
         push_bytes: push.map_or(0, |(_, size)| size),
         layouts: layouts.into_values().collect(),
     })
-}
-
-/// What an entry point does with a variable.
-fn access(module: &Module, variable: &GlobalVariable, used: GlobalUse, passed: bool) -> (bool, bool) {
-    let atomic = used.contains(GlobalUse::ATOMIC);
-    let (mut reads, mut writes) =
-        (atomic || used.contains(GlobalUse::READ), atomic || used.contains(GlobalUse::WRITE));
-    if let TypeInner::Image { class: ImageClass::Storage { access, .. }, .. } =
-        module.types[variable.ty].inner
-    {
-        // naga notes any use through a function's parameter as a read.
-        let (load, store) = (access.contains(StorageAccess::LOAD), access.contains(StorageAccess::STORE));
-        reads &= load;
-        writes |= passed && store;
-    }
-    (reads, writes)
-}
-
-/// Images that are handed to functions as arguments.
-fn passed_to_functions(module: &Module) -> BTreeSet<Handle<GlobalVariable>> {
-    fn walk(function: &Function, block: &Block, found: &mut BTreeSet<Handle<GlobalVariable>>) {
-        for statement in block.iter() {
-            match statement {
-                Statement::Call { arguments, .. } => {
-                    found.extend(arguments.iter().filter_map(|a| match function.expressions[*a] {
-                        Expression::GlobalVariable(handle) => Some(handle),
-                        _ => None,
-                    }));
-                }
-                Statement::Block(inner) => walk(function, inner, found),
-                Statement::If { accept, reject, .. } => {
-                    walk(function, accept, found);
-                    walk(function, reject, found);
-                }
-                Statement::Switch { cases, .. } => cases.iter().for_each(|c| walk(function, &c.body, found)),
-                Statement::Loop { body, continuing, .. } => {
-                    walk(function, body, found);
-                    walk(function, continuing, found);
-                }
-                _ => {}
-            }
-        }
-    }
-    let mut found = BTreeSet::new();
-    module.functions.iter().for_each(|(_, f)| walk(f, &f.body, &mut found));
-    module.entry_points.iter().for_each(|e| walk(&e.function, &e.function.body, &mut found));
-    found
 }
 
 fn binding(module: &Module, variable: &GlobalVariable) -> Result<Option<Binding>, String> {
