@@ -110,6 +110,43 @@ unsafe extern "system" fn receive(
 mod tests {
     use super::*;
 
+    /// Two submits without a barrier between them, which `Recorder` cannot express.
+    #[test]
+    fn a_missing_barrier_between_two_submits_is_seen() {
+        use crate::gpu::{BufferUse, Gpu, OpenOptions};
+        let gpu = Gpu::open(&OpenOptions { validation: true, ..Default::default() }).unwrap();
+        let x = gpu.buffer("x", 64, BufferUse::Device).unwrap();
+        let device = &gpu.0.device;
+        let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.0.queue_family);
+        // SAFETY: all handles are of this device and alive; the wait at the end precedes their destruction.
+        unsafe {
+            let pool = device.create_command_pool(&pool, None).unwrap();
+            let list = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(2);
+            let queue = *gpu.0.queue.as_ref().unwrap().lock().unwrap();
+            for cmd in device.allocate_command_buffers(&list).unwrap() {
+                device.begin_command_buffer(cmd, &Default::default()).unwrap();
+                device.cmd_fill_buffer(cmd, x.0.raw, 0, 64, 1);
+                device.end_command_buffer(cmd).unwrap();
+                let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
+                let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+                device.queue_submit2(queue, &submit, vk::Fence::null()).unwrap();
+            }
+            device.queue_wait_idle(queue).unwrap();
+            device.destroy_command_pool(pool, None);
+        }
+        let messages = gpu.validation_messages();
+        assert!(messages.iter().any(|m| m.contains("SYNC-HAZARD")), "{messages:?}");
+    }
+
+    #[test]
+    fn a_muted_hint_is_dropped_and_an_error_of_the_same_id_is_kept() {
+        let log = ValidationLog::default();
+        keep(&log.0, MUTED[0].id, "For optimal performance image should be in another layout");
+        log.assert_clean().unwrap();
+        keep(&log.0, MUTED[0].id, "image is in another layout than expected");
+        log.assert_clean().unwrap_err();
+    }
+
     #[test]
     fn a_muted_hint_is_dropped_and_an_error_of_the_same_id_is_kept() {
         let log = ValidationLog::default();
