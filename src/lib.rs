@@ -8,6 +8,7 @@ pub mod measure;
 pub mod mesh;
 pub mod method;
 pub mod occlusion;
+pub mod picture;
 pub mod renderer;
 pub mod scene;
 pub mod stage;

@@ -1,1 +1,279 @@
-//! occlusion
+//! What is computed at a voxel: ray sets, quadrature along a ray, radius, start offset (method.md §2–§4).
+
+use crate::{Error, Result};
+use glam::Vec3;
+
+/// Directions of the rays cast from every voxel.
+///
+/// The plain sets are the paper's (CAO §4: 6, 14, 26, 54 rays, equal weights); their directions are the lattice
+/// vectors that its authors' program uses, without its jitter. The weighted sets `…w` carry the weights of the
+/// Lebedev rules of degree 5, 7 and 11, which integrate the sphere exactly to that degree (method.md §4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RaySet {
+    /// The 6 faces of a cube, equal weights.
+    R6,
+    /// Faces and corners, equal weights.
+    R14,
+    /// Faces, edges and corners, equal weights.
+    R26,
+    /// The nine cells of each face of a cube, equal weights.
+    R54,
+    /// Faces and corners with the weights of degree 5.
+    W14,
+    /// Faces, edges and corners with the weights of degree 7.
+    W26,
+    /// Faces, edges, corners and (1,1,3) with the weights of degree 11.
+    W50,
+}
+
+impl RaySet {
+    /// Every set, in the order of its cost.
+    pub const ALL: [Self; 7] = [Self::R6, Self::R14, Self::W14, Self::R26, Self::W26, Self::W50, Self::R54];
+
+    /// Name on the command line and in scene files: `6`, `14`, `26`, `54`, `14w`, `26w`, `50w`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::R6 => "6",
+            Self::R14 => "14",
+            Self::R26 => "26",
+            Self::R54 => "54",
+            Self::W14 => "14w",
+            Self::W26 => "26w",
+            Self::W50 => "50w",
+        }
+    }
+
+    /// The set called `name`.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|set| set.name() == name).ok_or_else(|| Error::Config {
+            what: "rays".into(),
+            problem: format!("\"{name}\" is no ray set; there are {}", Self::ALL.map(Self::name).join(", ")),
+        })
+    }
+
+    /// Lattice vectors and weights, Σ weights = 1, in the fixed order in which every implementation sums them.
+    ///
+    /// The direction of a ray is the vector's unit vector *in millimetres*, whatever the spacing.
+    pub fn directions(self) -> Vec<([i32; 3], f64)> {
+        let orbits: &[([i32; 3], f64)] = match self {
+            Self::R6 => &[([1, 0, 0], 1.0 / 6.0)],
+            Self::R14 => &[([1, 0, 0], 1.0 / 14.0), ([1, 1, 1], 1.0 / 14.0)],
+            Self::R26 => &[([1, 0, 0], 1.0 / 26.0), ([1, 1, 0], 1.0 / 26.0), ([1, 1, 1], 1.0 / 26.0)],
+            Self::R54 => &[([1, 0, 0], 1.0 / 54.0), ([3, 2, 0], 1.0 / 54.0), ([3, 2, 2], 1.0 / 54.0)],
+            Self::W14 => &[([1, 0, 0], 1.0 / 15.0), ([1, 1, 1], 3.0 / 40.0)],
+            Self::W26 => &[([1, 0, 0], 1.0 / 21.0), ([1, 1, 0], 4.0 / 105.0), ([1, 1, 1], 9.0 / 280.0)],
+            Self::W50 => &[
+                ([1, 0, 0], 4.0 / 315.0),
+                ([1, 1, 0], 64.0 / 2835.0),
+                ([1, 1, 1], 27.0 / 1280.0),
+                ([3, 1, 1], 14641.0 / 725_760.0),
+            ],
+        };
+        orbits.iter().flat_map(|&(v, weight)| orbit(v).into_iter().map(move |d| (d, weight))).collect()
+    }
+
+    /// Unit vectors in millimetre space and weights, as [`Self::directions`] orders them.
+    pub fn unit_vectors(self) -> Vec<(Vec3, f32)> {
+        let unit = |v: [i32; 3]| {
+            let length = f64::from(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            Vec3::from_array(v.map(|c| (f64::from(c) / length) as f32))
+        };
+        self.directions().into_iter().map(|(v, weight)| (unit(v), weight as f32)).collect()
+    }
+}
+
+/// All images of `v` under the symmetries of the cube, in lexicographic order.
+fn orbit(v: [i32; 3]) -> Vec<[i32; 3]> {
+    let mut images = Vec::new();
+    for p in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+        for signs in 0..8_u32 {
+            let image: [i32; 3] =
+                std::array::from_fn(|i| if signs >> i & 1 == 1 { -v[p[i]] } else { v[p[i]] });
+            images.push(image);
+        }
+    }
+    images.sort_unstable();
+    images.dedup();
+    images
+}
+
+/// How a ray's samples become its ambient value (method.md §3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quadrature {
+    /// CAO eq. (2) as printed: each cell counts with its entry transmittance.
+    Left,
+    /// Cells centred on the samples count with the mean of their entry and exit transmittance.
+    Cell,
+    /// Opacity linear between consecutive samples, integrated with the segment's mean extinction.
+    Segment,
+}
+
+impl Quadrature {
+    /// Every rule.
+    pub const ALL: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
+
+    /// Name on the command line: `left`, `cell`, `segment`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Left => "left",
+            Self::Cell => "cell",
+            Self::Segment => "segment",
+        }
+    }
+
+    /// The rule called `name`.
+    pub fn parse(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|rule| rule.name() == name).ok_or_else(|| Error::Config {
+            what: "quadrature".into(),
+            problem: format!("\"{name}\" is no rule; there are {}", Self::ALL.map(Self::name).join(", ")),
+        })
+    }
+}
+
+/// Settings of local ambient occlusion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Occlusion {
+    /// Directions and weights.
+    pub rays: RaySet,
+    /// Rule along a ray.
+    pub quadrature: Quadrature,
+    /// Radius of the neighbourhood in mm, ≥ 0; 0 leaves every voxel unoccluded.
+    pub radius_mm: f32,
+    /// Distance in mm at which a ray starts; `None` is half a step, which puts samples at whole steps.
+    pub offset_mm: Option<f32>,
+    /// Distance in mm between samples; `None` is the smallest spacing.
+    pub step_mm: Option<f32>,
+}
+
+impl Occlusion {
+    /// The paper's setting (CAO §4) for a volume of this smallest spacing in mm: 26 rays, 20 voxels.
+    pub fn paper(min_spacing: f64) -> Self {
+        Self {
+            rays: RaySet::R26,
+            quadrature: Quadrature::Left,
+            radius_mm: (20.0 * min_spacing) as f32,
+            offset_mm: None,
+            step_mm: None,
+        }
+    }
+
+    /// Refuses lengths that are negative, not finite, or ask for more than [`Self::MAX_SAMPLES`] a ray.
+    pub fn check(&self, min_spacing: f64) -> Result<()> {
+        let length = |what: &str, value: Option<f32>, positive: bool| match value {
+            Some(v) if !v.is_finite() || v < 0.0 || (positive && v == 0.0) => Err(Error::Config {
+                what: what.into(),
+                problem: format!("{v} mm; expected a length {} 0 mm", if positive { ">" } else { ">=" }),
+            }),
+            _ => Ok(()),
+        };
+        length("radius_mm", Some(self.radius_mm), false)?;
+        length("offset_mm", self.offset_mm, false)?;
+        length("step_mm", self.step_mm, true)?;
+        let samples = (f64::from(self.radius_mm) / f64::from(self.step(min_spacing))).round();
+        if samples > f64::from(Self::MAX_SAMPLES) {
+            return Err(Error::Limit {
+                what: format!("radius {} mm in steps of {} mm", self.radius_mm, self.step(min_spacing)),
+                needed: samples as u64,
+                limit: Self::MAX_SAMPLES.into(),
+                hint: "make the radius smaller or the step longer".into(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Most samples of one ray; more has no use at any volume's size that a device holds.
+    pub const MAX_SAMPLES: u32 = 4096;
+
+    /// Δ, distance between samples in mm.
+    pub fn step(&self, min_spacing: f64) -> f32 {
+        self.step_mm.unwrap_or(min_spacing as f32)
+    }
+
+    /// M = round(R/Δ), samples of a ray (method.md §2).
+    pub fn samples(&self, min_spacing: f64) -> u32 {
+        (self.radius_mm / self.step(min_spacing)).round() as u32
+    }
+
+    /// Distance in mm of the first sample from the voxel's centre, `s_1`; the m-th is `s_1 + (m-1)Δ`.
+    pub fn first(&self, min_spacing: f64) -> f32 {
+        let step = self.step(min_spacing);
+        self.offset_mm.map_or(step, |offset| offset + 0.5 * step)
+    }
+
+    /// Distance in mm of the farthest sample, `s_M`; 0 when there is none.
+    pub fn reach(&self, min_spacing: f64) -> f32 {
+        match self.samples(min_spacing) {
+            0 => 0.0,
+            m => self.first(min_spacing) + (m - 1) as f32 * self.step(min_spacing),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_sum_to_one_and_sets_have_their_size() {
+        for set in RaySet::ALL {
+            let directions = set.directions();
+            let count: usize = set.name().trim_end_matches('w').parse().unwrap();
+            assert_eq!(directions.len(), count, "{}", set.name());
+            let sum: f64 = directions.iter().map(|d| d.1).sum();
+            assert!((sum - 1.0).abs() < 1e-14, "{} sums to {sum}", set.name());
+        }
+    }
+
+    /// Monomials x^a y^b z^c up to the rule's degree, against their exact mean over the sphere.
+    #[test]
+    fn weighted_sets_integrate_the_sphere_to_their_degree() {
+        fn double_factorial(n: i32) -> f64 {
+            if n <= 0 { 1.0 } else { f64::from(n) * double_factorial(n - 2) }
+        }
+        for (set, degree) in [(RaySet::R6, 3), (RaySet::W14, 5), (RaySet::W26, 7), (RaySet::W50, 11)] {
+            let mean = |a: i32, b: i32, c: i32| -> f64 {
+                set.directions()
+                    .iter()
+                    .map(|&(v, w)| {
+                        let r = f64::from(v.map(|c| c * c).iter().sum::<i32>()).sqrt();
+                        let [x, y, z] = v.map(|c| f64::from(c) / r);
+                        w * x.powi(a) * y.powi(b) * z.powi(c)
+                    })
+                    .sum()
+            };
+            let exact = |a: i32, b: i32, c: i32| {
+                if (a | b | c) & 1 == 1 {
+                    return 0.0;
+                }
+                double_factorial(a - 1) * double_factorial(b - 1) * double_factorial(c - 1)
+                    / double_factorial(a + b + c + 1)
+            };
+            let worst = |degree: i32| {
+                (0..=degree)
+                    .flat_map(|a| (0..=degree - a).map(move |b| (a, b)))
+                    .map(|(a, b)| (degree - a - b, a, b))
+                    .map(|(a, b, c)| (mean(a, b, c) - exact(a, b, c)).abs())
+                    .fold(0.0, f64::max)
+            };
+            for d in 0..=degree {
+                assert!(worst(d) < 1e-14, "{} at degree {d}: {}", set.name(), worst(d));
+            }
+            assert!(worst(degree + 1) > 1e-4, "{} would be exact beyond {degree}", set.name());
+        }
+    }
+
+    #[test]
+    fn impossible_lengths_are_refused_by_name() {
+        let good = Occlusion::paper(1.0);
+        assert!(good.check(1.0).is_ok());
+        for (bad, name) in [
+            (Occlusion { radius_mm: -3.0, ..good }, "radius_mm"),
+            (Occlusion { radius_mm: f32::NAN, ..good }, "radius_mm"),
+            (Occlusion { offset_mm: Some(-1.0), ..good }, "offset_mm"),
+            (Occlusion { step_mm: Some(0.0), ..good }, "step_mm"),
+            (Occlusion { radius_mm: 1e6, ..good }, "radius"),
+        ] {
+            assert!(bad.check(1.0).unwrap_err().to_string().starts_with(name));
+        }
+    }
+}

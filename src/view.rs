@@ -1,1 +1,239 @@
-//! view
+//! Eyes: pose and field-of-view tangents as OpenXR gives them, and the stereo rig of a scene file.
+
+use crate::{Error, Result};
+use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4};
+
+/// Signed tangents of the four half-angles of an asymmetric field of view: left < right, down < up
+/// (`tan(XrFovf)`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tangents {
+    /// Left edge, usually negative.
+    pub left: f32,
+    /// Right edge.
+    pub right: f32,
+    /// Upper edge.
+    pub up: f32,
+    /// Lower edge, usually negative.
+    pub down: f32,
+}
+
+/// One eye. Looks down −z of its frame, +y is up, +x is right; world is the volume's millimetre frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Position of the eye in mm.
+    pub position: Vec3,
+    /// Rotation from the eye's frame to the world.
+    pub orientation: Quat,
+    /// Field of view.
+    pub tan: Tangents,
+    /// Distance in mm of the plane of depth 0; nothing nearer is drawn.
+    pub near_mm: f32,
+    /// Distance in mm of the plane of depth 1.
+    pub far_mm: f32,
+}
+
+impl View {
+    /// Refuses fields of view, planes and poses that no projection has.
+    pub fn check(&self) -> Result<()> {
+        let t = self.tan;
+        let finite = [t.left, t.right, t.up, t.down, self.near_mm, self.far_mm].iter().all(|v| v.is_finite());
+        let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
+        if !finite || t.left >= t.right || t.down >= t.up {
+            return refuse(
+                "field of view",
+                format!("{t:?}; expected finite tangents, left < right, down < up"),
+            );
+        }
+        if !(self.near_mm > 0.0 && self.far_mm > self.near_mm) {
+            let planes = format!("near {} mm, far {} mm; expected 0 < near < far", self.near_mm, self.far_mm);
+            return refuse("clip planes", planes);
+        }
+        if !self.position.is_finite() || !self.orientation.is_finite() || !self.orientation.is_normalized() {
+            return refuse("eye pose", "expected a finite position and a unit quaternion".into());
+        }
+        Ok(())
+    }
+
+    /// World → eye frame.
+    pub fn view_matrix(&self) -> Mat4 {
+        Mat4::from_rotation_translation(self.orientation, self.position).inverse()
+    }
+
+    /// Eye frame → Vulkan clip space: y down, depth 0 at `near_mm`, 1 at `far_mm`.
+    pub fn projection(&self) -> Mat4 {
+        let Tangents { left, right, up, down } = self.tan;
+        let (n, f) = (self.near_mm, self.far_mm);
+        let (w, h) = (right - left, up - down);
+        Mat4::from_cols(
+            Vec4::new(2.0 / w, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, -2.0 / h, 0.0, 0.0),
+            Vec4::new((right + left) / w, -(up + down) / h, -f / (f - n), -1.0),
+            Vec4::new(0.0, 0.0, -f * n / (f - n), 0.0),
+        )
+    }
+
+    /// World → Vulkan clip space.
+    pub fn view_projection(&self) -> Mat4 {
+        self.projection() * self.view_matrix()
+    }
+
+    /// Ray through image coordinates `uv` in [0,1]², origin at the top left: (eye position, direction whose
+    /// component along the view axis is 1, so that its parameter is the depth in mm).
+    pub fn ray(&self, uv: Vec2) -> (Vec3, Vec3) {
+        let t = self.tan;
+        let x = t.left + (t.right - t.left) * uv.x;
+        let y = t.up + (t.down - t.up) * uv.y;
+        (self.position, self.orientation * Vec3::new(x, y, -1.0))
+    }
+
+    /// Image coordinates in [0,1]² and Vulkan depth of a world point; `None` behind the eye.
+    pub fn project(&self, world: Vec3) -> Option<(Vec2, f32)> {
+        let clip = self.view_projection() * world.extend(1.0);
+        (clip.w > 0.0).then(|| (Vec2::new(clip.x / clip.w, clip.y / clip.w) * 0.5 + 0.5, clip.z / clip.w))
+    }
+}
+
+/// Two eyes on a head that looks at a point, with parallel view axes and a shifted field of view each, so that the
+/// screen plane has no parallax.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StereoRig {
+    /// Midpoint between the eyes in mm.
+    pub position: Vec3,
+    /// Point that the head looks at in mm.
+    pub target: Vec3,
+    /// Approximate up direction.
+    pub up: Vec3,
+    /// Distance between the eyes in mm; 0 gives equal eyes.
+    pub ipd_mm: f32,
+    /// Vertical field of view in degrees.
+    pub fov_deg: f32,
+    /// Distance in mm of the plane without parallax; `None` is the distance to the target.
+    pub screen_mm: Option<f32>,
+}
+
+impl StereoRig {
+    /// A rig that frames a volume of this size in mm from the given azimuth (about +z, from −y) and elevation in
+    /// degrees. The eyes' distance is 1/15 of the viewing distance, at most 63 mm, a comfortable parallax.
+    pub fn framing(size_mm: [f64; 3], azimuth_deg: f32, elevation_deg: f32) -> Self {
+        let radius = 0.5 * Vec3::from_array(size_mm.map(|s| s as f32)).length().max(1e-3);
+        let fov_deg = 35.0_f32;
+        let distance = 0.92 * radius / (0.5 * fov_deg).to_radians().sin();
+        let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+        let from = Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin());
+        let up = if elevation_deg.abs() > 89.0 { Vec3::Y } else { Vec3::Z };
+        Self {
+            position: from * distance,
+            target: Vec3::ZERO,
+            up,
+            ipd_mm: (distance / 15.0).min(63.0),
+            fov_deg,
+            screen_mm: None,
+        }
+    }
+
+    /// Left and right eye for images of this aspect (width / height).
+    pub fn views(&self, aspect: f32, near_mm: f32, far_mm: f32) -> Result<[View; 2]> {
+        let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
+        let ahead = self.target - self.position;
+        if !ahead.is_finite() || ahead.length() < 1e-6 {
+            return refuse(
+                "stereo.target",
+                format!("{} is the eyes' own place; expected another point", self.target),
+            );
+        }
+        if !(self.ipd_mm >= 0.0 && self.ipd_mm.is_finite()) {
+            return refuse("stereo.ipd_mm", format!("{}; expected a length >= 0 mm", self.ipd_mm));
+        }
+        if !(self.fov_deg > 0.0 && self.fov_deg < 179.0) {
+            return refuse("stereo.fov_deg", format!("{}; expected 0 < fov < 179 degrees", self.fov_deg));
+        }
+        let screen = self.screen_mm.unwrap_or(ahead.length());
+        if !(screen > 0.0 && screen.is_finite()) {
+            return refuse("stereo.screen_mm", format!("{screen}; expected a length > 0 mm"));
+        }
+        let back = -ahead.normalize();
+        let right = self.up.normalize_or_zero().cross(back);
+        if right.length() < 1e-4 {
+            return refuse("stereo.up", format!("{} is the viewing direction; expected another", self.up));
+        }
+        let right = right.normalize();
+        let orientation = Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize();
+        let up = (0.5 * self.fov_deg).to_radians().tan();
+        let eye = |side: f32| {
+            let shift = -side * 0.5 * self.ipd_mm / screen;
+            let view = View {
+                position: self.position + right * (side * 0.5 * self.ipd_mm),
+                orientation,
+                tan: Tangents { left: -up * aspect + shift, right: up * aspect + shift, up, down: -up },
+                near_mm,
+                far_mm,
+            };
+            view.check().map(|()| view)
+        };
+        Ok([eye(-1.0)?, eye(1.0)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rig() -> StereoRig {
+        StereoRig::framing([100.0, 120.0, 80.0], 30.0, 20.0)
+    }
+
+    #[test]
+    fn rays_and_projection_are_inverse() {
+        for view in rig().views(1.2, 1.0, 1000.0).unwrap() {
+            for uv in [Vec2::new(0.1, 0.2), Vec2::new(0.5, 0.5), Vec2::new(0.9, 0.7)] {
+                let (origin, direction) = view.ray(uv);
+                let (back, depth) = view.project(origin + direction * 200.0).unwrap();
+                assert!((back - uv).length() < 1e-5);
+                let expected = 1000.0 / 999.0 * (1.0 - 1.0 / 200.0);
+                assert!((depth - expected).abs() < 1e-5, "{depth} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn depth_is_zero_at_near_and_one_at_far() {
+        let view = rig().views(1.0, 2.0, 500.0).unwrap()[0];
+        for (distance, depth) in [(2.0, 0.0), (500.0, 1.0)] {
+            let (origin, direction) = view.ray(Vec2::splat(0.5));
+            // Positions of a few hundred mm carry 3e-5 mm of f32 rounding, halved by the depth's slope at 2 mm.
+            assert!((view.project(origin + direction * distance).unwrap().1 - depth).abs() < 5e-5);
+        }
+    }
+
+    #[test]
+    fn the_target_has_no_parallax_and_nearer_points_do() {
+        let rig = rig();
+        let [left, right] = rig.views(1.0, 1.0, 1000.0).unwrap();
+        let at = |p: Vec3| (left.project(p).unwrap().0, right.project(p).unwrap().0);
+        let (l, r) = at(rig.target);
+        assert!((l - r).length() < 1e-5 && (l - Vec2::splat(0.5)).length() < 1e-5);
+        let (l, r) = at(rig.target + (rig.position - rig.target) * 0.3);
+        assert!(l.x > r.x + 1e-3, "a near point lies further right in the left eye");
+    }
+
+    #[test]
+    fn image_top_left_is_left_and_up() {
+        let view = rig().views(1.0, 1.0, 1000.0).unwrap()[0];
+        let (_, direction) = view.ray(Vec2::ZERO);
+        let local = view.orientation.inverse() * direction;
+        assert!(local.x < 0.0 && local.y > 0.0 && (local.z + 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn impossible_rigs_are_refused_by_name() {
+        let rig = rig();
+        for (bad, name) in [
+            (StereoRig { target: rig.position, ..rig }, "stereo.target"),
+            (StereoRig { ipd_mm: -1.0, ..rig }, "stereo.ipd_mm"),
+            (StereoRig { fov_deg: 180.0, ..rig }, "stereo.fov_deg"),
+            (StereoRig { up: rig.position, ..rig }, "stereo.up"),
+        ] {
+            assert!(bad.views(1.0, 1.0, 10.0).unwrap_err().to_string().starts_with(name));
+        }
+    }
+}

@@ -1,1 +1,4 @@
-//! measure
+//! Numbers in, numbers out: whether the claims hold.
+
+pub mod exactness;
+pub mod random;

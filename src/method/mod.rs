@@ -1,1 +1,5 @@
-//! method
+//! Ambient occlusion methods, each on one page: dispatch, visible barrier, dispatch.
+
+pub mod cao;
+pub mod lao;
+pub mod volumes;

@@ -1,0 +1,58 @@
+// Bit by bit comparison of two ambient volumes on every voxel that has a value: all but clipped voxels that touch no visible
+// one, and, where only needed voxels are computed, voxels without opacity in their 3x3x3.
+
+struct CompareParams {
+    dims: vec3<u32>,
+    only_needed: u32,
+}
+
+struct Difference {
+    compared: atomic<u32>,
+    different: atomic<u32>,
+    // bits of the largest |difference|; order of bits is order of values for floats >= 0
+    largest: atomic<u32>,
+    // voxels of category b, or a touching a visible one, among the compared
+    recomputed: atomic<u32>,
+}
+
+const CLIPPED = 0u;
+const UNTOUCHED = 2u;
+
+var<immediate> params: CompareParams;
+@group(0) @binding(0) var opacity: texture_3d<f32>;
+@group(0) @binding(1) var mask: texture_3d<u32>;
+@group(0) @binding(2) var expected: texture_3d<f32>;
+@group(0) @binding(3) var actual: texture_3d<f32>;
+@group(0) @binding(4) var<storage, read_write> difference: Difference;
+
+@compute @workgroup_size(8, 8, 4)
+fn main(@builtin(global_invocation_id) voxel: vec3<u32>) {
+    if any(voxel >= params.dims) {
+        return;
+    }
+    let last = min(voxel + 1u, params.dims - 1u);
+    let first = max(voxel, vec3(1u)) - 1u;
+    var touches_visible = false;
+    var touches_opacity = params.only_needed == 0u;
+    for (var z = first.z; z <= last.z; z++) {
+        for (var y = first.y; y <= last.y; y++) {
+            for (var x = first.x; x <= last.x; x++) {
+                touches_visible = touches_visible || textureLoad(mask, vec3(x, y, z), 0).r != CLIPPED;
+                touches_opacity = touches_opacity || textureLoad(opacity, vec3(x, y, z), 0).r > 0.0;
+            }
+        }
+    }
+    if !touches_visible || !touches_opacity {
+        return;
+    }
+    atomicAdd(&difference.compared, 1u);
+    if textureLoad(mask, voxel, 0).r != UNTOUCHED {
+        atomicAdd(&difference.recomputed, 1u);
+    }
+    let e = textureLoad(expected, voxel, 0).r;
+    let a = textureLoad(actual, voxel, 0).r;
+    if bitcast<u32>(e) != bitcast<u32>(a) {
+        atomicAdd(&difference.different, 1u);
+        atomicMax(&difference.largest, bitcast<u32>(abs(e - a)));
+    }
+}

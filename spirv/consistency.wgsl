@@ -1,0 +1,60 @@
+// What each eye sees at given points of the volume: for every point and eye, the transmittance in front of it and the
+// ambient factor that the ray cast reads there. The point goes the eye's own way: projected into its image, back along the
+// pixel's ray, to the sample at the point's depth. Stereo consistency (CAO section 5) is that both read the same bits.
+
+@group(0) @binding(0) var opacity: texture_3d<f32>;
+@group(0) @binding(1) var ambient: texture_3d<f32>;
+@group(0) @binding(2) var field: sampler;
+@group(0) @binding(3) var edge: sampler;
+@group(0) @binding(4) var<uniform> frame: Frame;
+@group(0) @binding(5) var<storage, read> points: Points;
+@group(0) @binding(6) var<storage, read_write> seen: Seen;
+
+#include "shared/eyes.wgsl"
+
+struct ConsistencyParams {
+    count: u32,
+}
+
+struct Points {
+    // world position in mm
+    world: array<vec4<f32>>,
+}
+
+struct Seen {
+    // two entries a point, left and right: transmittance (-1: outside the image), ambient factor
+    by_eye: array<vec2<f32>>,
+}
+
+var<immediate> params: ConsistencyParams;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= params.count {
+        return;
+    }
+    let world = points.world[id.x];
+    for (var view = 0u; view < 2u; view++) {
+        let eye = frame.eye[view];
+        let clip = eye.view_projection * vec4(world.xyz, 1.0);
+        let uv = clip.xy / clip.w * 0.5 + 0.5;
+        let out = 2u * id.x + view;
+        if clip.w < eye.depth.z || any(uv < vec2(0.0)) || any(uv > vec2(1.0)) {
+            seen.by_eye[out] = vec2(-1.0, 0.0);
+            continue;
+        }
+        let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
+        let start = index_of(eye.origin.xyz);
+        let along = direction / frame.spacing.xyz;
+        let step = frame.spacing.w / length(direction);
+        let exponent = frame.spacing.w / frame.light.w;
+        // Up to the voxel that the point belongs to.
+        let t_end = clip.w - 1.5 * max(frame.spacing.x, max(frame.spacing.y, frame.spacing.z)) / length(direction);
+        var transmittance = 1.0;
+        for (var t = max(eye.depth.z, 0.0); t < t_end && transmittance > 0.01; t += step) {
+            let a = textureSampleLevel(opacity, field, (start + t * along + 0.5) / frame.dims.xyz, 0.0).r;
+            transmittance *= select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
+        }
+        seen.by_eye[out] = vec2(transmittance, ambient_at(start + clip.w * along));
+    }
+}

@@ -1,0 +1,112 @@
+// Dilation maps of one mesh clip (CAO section 3.4 step 3, eq. (4)): the Minkowski sum of the depth layers and a sphere.
+//
+// Conservative: the maps stand for cells, not for points. `reduce` takes the hull of each block of pixels; `main` adds
+// the sphere over the distance between cells, max(|dx| - 1, 0), so that every point within `radius` of any point of the
+// layers lies inside. For a kept shape the layers are contracted instead: what remains is inside with its whole
+// neighbourhood. LITERAL is eq. (4) as printed, with distances between pixel centres, at the layers' resolution.
+
+struct DilateParams {
+    // pixels along the edge of the layers, cells along the edge of the dilation maps
+    resolution: u32,
+    cells: u32,
+    layers_at: u32,
+    dilation_at: u32,
+    // mm
+    radius: f32,
+    cell_mm: f32,
+    depth_mm: f32,
+    flags: u32,
+}
+
+struct Layers {
+    depth: array<f32>,
+}
+
+struct Blocks {
+    depth: array<f32>,
+}
+
+struct Dilation {
+    depth: array<f32>,
+}
+
+const KEEP = 1u;
+const LITERAL = 2u;
+
+var<immediate> params: DilateParams;
+@group(0) @binding(0) var<storage, read> layers: Layers;
+@group(0) @binding(1) var<storage, read_write> blocks: Blocks;
+@group(0) @binding(2) var<storage, read_write> dilation: Dilation;
+
+// Hull of the intervals in a block of pixels (kept shapes: what all of them share). z is the layer pair.
+@compute @workgroup_size(8, 8, 1)
+fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= vec2(params.cells)) {
+        return;
+    }
+    let keep = (params.flags & KEEP) != 0u;
+    let size = params.resolution * params.resolution;
+    let block = params.resolution / params.cells;
+    var front = select(1.0, 0.0, keep);
+    var back = select(0.0, 1.0, keep);
+    for (var y = id.y * block; y < (id.y + 1u) * block; y++) {
+        for (var x = id.x * block; x < (id.x + 1u) * block; x++) {
+            let at = params.layers_at + id.z * 2u * size + y * params.resolution + x;
+            let f = layers.depth[at];
+            let b = layers.depth[at + size];
+            if keep {
+                front = max(front, f);
+                back = min(back, select(b, 0.0, f >= 1.0));
+            } else if f < 1.0 {
+                front = min(front, f);
+                back = max(back, b);
+            }
+        }
+    }
+    let cells = params.cells * params.cells;
+    let out = id.z * 2u * cells + id.y * params.cells + id.x;
+    blocks.depth[out] = front;
+    blocks.depth[out + cells] = back;
+}
+
+@compute @workgroup_size(8, 8, 1)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= vec2(params.cells)) {
+        return;
+    }
+    let keep = (params.flags & KEEP) != 0u;
+    let literal = (params.flags & LITERAL) != 0u;
+    let cells = params.cells * params.cells;
+    let in_blocks = id.z * 2u * cells;
+    // The gap between cells n apart is n - 1 cells, so cells up to radius / cell + 1 apart count.
+    let window = i32(ceil(params.radius / params.cell_mm)) + 1;
+    let here = vec2<i32>(id.xy);
+    let limit = i32(params.cells) - 1;
+    // A kept shape ends at the map's edge at the latest: everything beyond is outside it.
+    var front = select(2.0, 0.0, keep);
+    var back = select(-1.0, 1.0, keep);
+    for (var y = max(here.y - window, 0); y <= min(here.y + window, limit); y++) {
+        for (var x = max(here.x - window, 0); x <= min(here.x + window, limit); x++) {
+            let apart = abs(vec2(x, y) - here);
+            let gap = vec2<f32>(select(max(apart - 1, vec2(0)), apart, literal)) * params.cell_mm;
+            let below = params.radius * params.radius - dot(gap, gap);
+            if below < 0.0 {
+                continue;
+            }
+            let height = sqrt(below) / params.depth_mm;
+            let at = in_blocks + u32(y) * params.cells + u32(x);
+            let f = blocks.depth[at];
+            let b = blocks.depth[at + cells];
+            if keep {
+                front = max(front, f + height);
+                back = min(back, b - height);
+            } else if f < 1.0 {
+                front = min(front, f - height);
+                back = max(back, b + height);
+            }
+        }
+    }
+    let out = params.dilation_at + id.z * 2u * cells + id.y * params.cells + id.x;
+    dilation.depth[out] = front;
+    dilation.depth[out + cells] = back;
+}

@@ -1,0 +1,152 @@
+// Stage 6 of CAO section 3.5: the volume by ray casting, both eyes in one multiview pass. Front to back, early
+// termination, bricks without opacity skipped, clipped samples skipped by the shadow test of section 3.2, ambient factor
+// from V_AO at every sample that shows anything.
+
+#include "shared/transfer.wgsl"
+
+@group(0) @binding(0) var volume: texture_3d<f32>;
+@group(0) @binding(2) var opacity: texture_3d<f32>;
+@group(0) @binding(3) var ambient: texture_3d<f32>;
+// linear; transparent outside, and continued from the edge
+@group(0) @binding(4) var field: sampler;
+@group(0) @binding(5) var edge: sampler;
+@group(0) @binding(6) var<uniform> frame: Frame;
+@group(0) @binding(7) var<storage, read> occupancy: Occupancy;
+@group(0) @binding(8) var<storage, read> clips: Clips;
+@group(0) @binding(9) var<storage, read> layers: Layers;
+
+#include "shared/clips.wgsl"
+#include "shared/eyes.wgsl"
+
+struct RaycastParams {
+    // pixels of one eye
+    size: vec2<f32>,
+}
+
+struct Occupancy {
+    visible: array<u32>,
+}
+
+struct Pixel {
+    // premultiplied, linear
+    @location(0) colour: vec4<f32>,
+    @builtin(frag_depth) depth: f32,
+}
+
+var<immediate> params: RaycastParams;
+
+// One triangle that covers the image.
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    return vec4(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+// Halvings of a step at a cut: to 1/16 of it.
+const CUT_HALVINGS = 4u;
+
+fn value_at(position: vec3<f32>) -> f32 {
+    return textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r * frame.scale + frame.bias;
+}
+
+fn opacity_at(position: vec3<f32>) -> f32 {
+    return textureSampleLevel(opacity, field, (position + 0.5) / frame.dims.xyz, 0.0).r;
+}
+
+// Lambert's term of a surface seen from either side, from the gradient of the clipped opacity, so that cut faces are shaded
+// as surfaces. Where there is no gradient there is no surface, and the term is 1.
+fn surface_light(position: vec3<f32>) -> f32 {
+    let gradient = vec3(
+        opacity_at(position + vec3(1.0, 0.0, 0.0)) - opacity_at(position - vec3(1.0, 0.0, 0.0)),
+        opacity_at(position + vec3(0.0, 1.0, 0.0)) - opacity_at(position - vec3(0.0, 1.0, 0.0)),
+        opacity_at(position + vec3(0.0, 0.0, 1.0)) - opacity_at(position - vec3(0.0, 0.0, 1.0)),
+    ) / (2.0 * frame.spacing.xyz);
+    let steepness = length(gradient);
+    if steepness < 1e-4 {
+        return 1.0;
+    }
+    return abs(dot(gradient, frame.light.xyz)) / steepness;
+}
+
+@fragment
+fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32) -> Pixel {
+    let uv = place.xy / params.size;
+    let eye = frame.eye[view];
+    let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
+    // Index space: the volume is the box from -0.5 to dims - 0.5.
+    let start = index_of(eye.origin.xyz);
+    let along = direction / frame.spacing.xyz;
+    let to_low = (vec3(-0.5) - start) / along;
+    let to_high = (frame.dims.xyz - 0.5 - start) / along;
+    let entry = min(to_low, to_high);
+    let leave = max(to_low, to_high);
+    let t_begin = max(max(entry.x, max(entry.y, entry.z)), eye.depth.z);
+    let t_end = min(min(leave.x, min(leave.y, leave.z)), eye.depth.w);
+
+    let slant = length(direction);
+    let step = frame.spacing.w / slant;
+    let exponent = frame.spacing.w / frame.light.w;
+    // Interleaved gradient noise (Jimenez 2014) against banding.
+    let noise = fract(52.9829189 * fract(dot(place.xy, vec2(0.06711056, 0.00583715))));
+    let phase = select(0.5, noise, frame.jitter > 0.0);
+    let bricks = (vec3<u32>(frame.dims.xyz) + 7u) / 8u;
+    let last_brick = vec3<i32>(bricks) - 1;
+
+    var colour = vec3(0.0);
+    var alpha = 0.0;
+    var depth = 1.0;
+    var k = 0.0;
+    var hidden = -1.0;
+    loop {
+        let t = t_begin + (k + phase) * step;
+        if !(t < t_end) || alpha >= frame.opaque {
+            break;
+        }
+        let position = start + t * along;
+        let brick = clamp(vec3<i32>(floor(position / 8.0)), vec3(0), last_brick);
+        let index = (u32(brick.z) * bricks.y + u32(brick.y)) * bricks.x + u32(brick.x);
+        if occupancy.visible[index] == 0u {
+            // To the first sample behind this brick; samples keep their places, so the picture does not change.
+            let low = vec3<f32>(brick) * 8.0;
+            let out_low = select((low - start) / along, vec3(3.0e38), brick == vec3(0));
+            let out_high = select((low + 8.0 - start) / along, vec3(3.0e38), brick == last_brick);
+            let out = select(out_low, out_high, along > vec3(0.0));
+            let t_out = min(out.x, min(out.y, out.z));
+            k = max(k + 1.0, ceil((t_out - t_begin) / step - phase));
+            continue;
+        }
+        k += 1.0;
+        if opacity_of(value_at(position)) <= 0.0 {
+            continue;
+        }
+        if !visible(eye.origin.xyz + t * direction) {
+            hidden = k;
+            continue;
+        }
+        // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
+        // one depth and shows no rings.
+        var t_shown = t;
+        if hidden == k - 1.0 {
+            var t_hidden = t - step;
+            for (var i = 0u; i < CUT_HALVINGS; i++) {
+                let middle = 0.5 * (t_hidden + t_shown);
+                if visible(eye.origin.xyz + middle * direction) {
+                    t_shown = middle;
+                } else {
+                    t_hidden = middle;
+                }
+            }
+        }
+        let shown = start + t_shown * along;
+        let value = value_at(shown);
+        let a = opacity_of(value);
+        let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
+        let light = frame.ambient + frame.diffuse * surface_light(shown);
+        let shade = light * mix(1.0, frame.gain * ambient_at(shown), frame.occluded);
+        colour += (1.0 - alpha) * covered * shade * colour_of(value);
+        alpha += (1.0 - alpha) * covered;
+        if depth == 1.0 && alpha >= 0.5 {
+            depth = eye.depth.x + eye.depth.y / t_shown;
+        }
+    }
+    return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
+}

@@ -1,0 +1,16 @@
+// Compacted list of bricks of 8x8x8 voxels; its head is the argument of an indirect dispatch.
+
+struct BrickList {
+    groups_x: u32,
+    groups_y: u32,
+    groups_z: u32,
+    count: u32,
+    items: array<u32>,
+}
+
+// Largest group count along one axis that every device has.
+const GROUPS_PER_ROW = 65535u;
+
+fn brick_at(index: u32, bricks: vec3<u32>) -> vec3<u32> {
+    return vec3(index % bricks.x, index / bricks.x % bricks.y, index / (bricks.x * bricks.y));
+}

@@ -1,0 +1,391 @@
+//! The device: opened by us, or adopted from a host that owns it.
+
+use super::{
+    feature::{API_VERSION, EXTENSIONS, Features},
+    hazard::{Hazards, ResourceId},
+    info::{DeviceInfo, choose, no_device},
+    memory::Memory,
+    validation::{LAYER, ValidationLog, enable_submit_time_checks},
+};
+use crate::{Error, Result};
+use ash::vk::{self, Handle};
+use std::{
+    ffi::{CStr, CString},
+    mem::ManuallyDrop,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
+/// A Vulkan device. Cheap to clone; everything made with it keeps it alive.
+#[derive(Clone)]
+pub struct Gpu(pub(crate) Arc<Inner>);
+
+/// How to open a device.
+#[derive(Debug, Clone, Default)]
+pub struct OpenOptions {
+    /// Index in [`Gpu::list`] or part of the device's name, any case; else the environment variable `CAO_DEVICE`; else the best.
+    pub device: Option<String>,
+    /// Run under the validation layer, with synchronization checks; also on when the environment has `CAO_VALIDATION=1`.
+    pub validation: bool,
+}
+
+/// Handles of a host that already uses Vulkan. They stay the host's: nothing here ever destroys them.
+pub struct Adopted {
+    /// Loader.
+    pub entry: ash::Entry,
+    /// Instance of Vulkan 1.3 or newer.
+    pub instance: ash::Instance,
+    /// Device that `device` was made of.
+    pub physical_device: vk::PhysicalDevice,
+    /// Device with [`Gpu::required_extensions`] and [`Gpu::required_features`] enabled.
+    pub device: ash::Device,
+    /// Family of the queue that will run the recorded commands; must do graphics and compute.
+    pub queue_family: u32,
+}
+
+/// What everything made with a [`Gpu`] shares.
+pub(crate) struct Inner {
+    pub memory: ManuallyDrop<Memory>,
+    pub device: ash::Device,
+    pub push_descriptor: ash::khr::push_descriptor::Device,
+    /// Names and labels, if the instance has them.
+    pub debug: Option<ash::ext::debug_utils::Device>,
+    /// Locked for submission; `None` for an adopted device, whose queue is the host's.
+    pub queue: Option<Mutex<vk::Queue>>,
+    pub queue_family: u32,
+    /// Valid bits of a timestamp; 0 if the queue has none.
+    pub timestamp_mask: u64,
+    pub info: DeviceInfo,
+    pub physical: vk::PhysicalDevice,
+    pub instance: ash::Instance,
+    pub log: ValidationLog,
+    hazards: Mutex<Hazards>,
+    next_id: AtomicU64,
+    /// What to destroy at the end; `None` for an adopted device.
+    owned: Option<Owned>,
+}
+
+/// Held until the device is gone.
+struct Owned {
+    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    /// The loaded library, which the function pointers point into.
+    _entry: ash::Entry,
+}
+
+/// Turns a Vulkan result into our error.
+pub(crate) fn vulkan(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> Error {
+    move |result| Error::Vulkan { call, object: object.into(), result }
+}
+
+/// An instance of ours.
+struct Instance {
+    entry: ash::Entry,
+    instance: ash::Instance,
+    /// The instance has VK_EXT_debug_utils.
+    debug: bool,
+}
+
+impl Instance {
+    fn new(validation: Option<&ValidationLog>) -> Result<Self> {
+        // SAFETY: loading the Vulkan loader runs its initialisers; it is the system's own library.
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::Device {
+            problem: format!("the Vulkan loader is missing ({e}); install it, on Debian or Ubuntu `apt install libvulkan1 mesa-vulkan-drivers`"),
+        })?;
+        // SAFETY: plain queries of the loader.
+        let (version, extensions, layers) = unsafe {
+            (
+                entry.try_enumerate_instance_version().ok().flatten().unwrap_or(vk::API_VERSION_1_0),
+                entry.enumerate_instance_extension_properties(None).unwrap_or_default(),
+                entry.enumerate_instance_layer_properties().unwrap_or_default(),
+            )
+        };
+        if version < API_VERSION {
+            let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
+            return Err(Error::Device {
+                problem: format!(
+                    "the Vulkan loader is of version {major}.{minor}, needed is 1.3; update libvulkan1"
+                ),
+            });
+        }
+        let debug = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::ext::debug_utils::NAME));
+        let mut names = Vec::new();
+        let mut layer_names = Vec::new();
+        if debug {
+            names.push(ash::ext::debug_utils::NAME.as_ptr());
+        }
+        let application = vk::ApplicationInfo::default().application_name(c"cao").api_version(API_VERSION);
+        let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
+        let mut messenger;
+        let mut create = vk::InstanceCreateInfo::default().application_info(&application);
+        if let Some(log) = validation {
+            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER)) {
+                return Err(Error::Device {
+                    problem: "validation was asked for, but its layer is missing; install it, on Debian or Ubuntu `apt install vulkan-validationlayers`".into(),
+                });
+            }
+            enable_submit_time_checks();
+            layer_names.push(LAYER.as_ptr());
+            names.push(vk::EXT_VALIDATION_FEATURES_NAME.as_ptr());
+            messenger = log.messenger();
+            create = create.push_next(&mut features).push_next(&mut messenger);
+        }
+        create = create.enabled_extension_names(&names).enabled_layer_names(&layer_names);
+        // SAFETY: `create` and what it points to live until the call returns; the log outlives the instance (see `messenger`).
+        let instance = unsafe { entry.create_instance(&create, None) }.map_err(|result| match result {
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_device(),
+            result => Error::Vulkan { call: "vkCreateInstance", object: "instance".into(), result },
+        })?;
+        Ok(Self { entry, instance, debug })
+    }
+
+    fn devices(&self) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>> {
+        // SAFETY: the instance is alive.
+        let list = unsafe { self.instance.enumerate_physical_devices() };
+        let list = list.map_err(vulkan("vkEnumeratePhysicalDevices", "instance"))?;
+        Ok(list.into_iter().map(|device| (device, DeviceInfo::of(&self.instance, device))).collect())
+    }
+
+    /// # Safety
+    /// Nothing made of the instance may be alive.
+    unsafe fn destroy(&self) {
+        // SAFETY: the caller's promise.
+        unsafe { self.instance.destroy_instance(None) }
+    }
+}
+
+impl Gpu {
+    /// All Vulkan devices, in the order of their indices, usable or not (see [`DeviceInfo::missing`]).
+    ///
+    /// # Errors
+    /// [`Error::Device`] if there is no loader or no driver.
+    pub fn list() -> Result<Vec<DeviceInfo>> {
+        let instance = Instance::new(None)?;
+        let devices = instance.devices();
+        // SAFETY: nothing was made of it.
+        unsafe { instance.destroy() };
+        Ok(devices?.into_iter().map(|(_, info)| info).collect())
+    }
+
+    /// Opens a device of our own with one queue.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if loader, driver, the wanted device, a required feature or the validation layer is missing, with the remedy.
+    pub fn open(options: &OpenOptions) -> Result<Self> {
+        let environment = |key| std::env::var(key).ok().filter(|value| !value.is_empty());
+        let validation =
+            options.validation || environment("CAO_VALIDATION").is_some_and(|value| value != "0");
+        let wanted = options.device.clone().or_else(|| environment("CAO_DEVICE"));
+        let log = ValidationLog::default();
+        let instance = Instance::new(validation.then_some(&log))?;
+        let device = Self::create_device(&instance, wanted.as_deref());
+        let (physical, info, device, family) = device.inspect_err(|_| {
+            // SAFETY: no device was made of it.
+            unsafe { instance.destroy() }
+        })?;
+        let Instance { entry, instance, debug } = instance;
+        let messenger = validation.then(|| {
+            let messages = ash::ext::debug_utils::Instance::new(&entry, &instance);
+            // SAFETY: the log is held by `Inner`, which destroys the messenger. Without a messenger validation would be mute, so a
+            // failure (out of host memory only) is kept as a message.
+            let messenger = unsafe { messages.create_debug_utils_messenger(&log.messenger(), None) };
+            (messages, messenger.unwrap_or_default())
+        });
+        // SAFETY: the device was created with one queue of this family.
+        let queue = unsafe { device.get_device_queue(family, 0) };
+        let parts = Parts { instance, physical, info, device, family, queue: Some(queue), debug, log };
+        // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
+        parts.build(Some(Owned { messenger, _entry: entry }))
+    }
+
+    fn create_device(
+        instance: &Instance,
+        wanted: Option<&str>,
+    ) -> Result<(vk::PhysicalDevice, DeviceInfo, ash::Device, u32)> {
+        let mut devices = instance.devices()?;
+        let infos: Vec<_> = devices.iter().map(|(_, info)| info.clone()).collect();
+        let (physical, info) = devices.swap_remove(choose(&infos, wanted)?);
+        let needs = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        // SAFETY: `physical` was enumerated from this instance.
+        let families = unsafe { instance.instance.get_physical_device_queue_family_properties(physical) };
+        let family = families.iter().position(|f| f.queue_flags.contains(needs)).ok_or_else(|| {
+            Error::Device { problem: format!("{} has no queue that does graphics and compute", info.name) }
+        })? as u32;
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+        let names: Vec<_> = EXTENSIONS.iter().map(|name| name.as_ptr()).collect();
+        let mut features = Features::required();
+        let mut chain = features.chain();
+        let create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&names)
+            .push_next(&mut chain);
+        // SAFETY: `create` and what it points to live until the call returns; features and extensions were checked by `choose`.
+        let device = unsafe { instance.instance.create_device(physical, &create, None) };
+        Ok((physical, info.clone(), device.map_err(vulkan("vkCreateDevice", &info.name))?, family))
+    }
+
+    /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers; nothing here submits, waits or
+    /// touches a queue, and [`Gpu::recorder`] refuses.
+    ///
+    /// # Safety
+    /// The handles must be valid and belong together, be made with Vulkan 1.3 or newer and with [`Gpu::required_extensions`] and
+    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the physical device lacks something that is needed.
+    pub unsafe fn adopt(host: Adopted) -> Result<Self> {
+        let info = DeviceInfo::of(&host.instance, host.physical_device);
+        choose(std::slice::from_ref(&info), None)?;
+        let parts = Parts {
+            instance: host.instance,
+            physical: host.physical_device,
+            info,
+            device: host.device,
+            family: host.queue_family,
+            queue: None,
+            debug: false,
+            log: ValidationLog::default(),
+        };
+        parts.build(None)
+    }
+
+    /// Device extensions that an adopted device must have.
+    pub fn required_extensions() -> &'static [&'static CStr] {
+        EXTENSIONS
+    }
+
+    /// Features that an adopted device must have.
+    pub fn required_features() -> Features {
+        Features::required()
+    }
+
+    /// What is known about the device.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.0.info
+    }
+
+    /// Messages of the validation layer so far; empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.0.log.messages()
+    }
+
+    /// The log behind [`Gpu::validation_messages`], readable after this `Gpu` is gone.
+    pub fn validation_log(&self) -> ValidationLog {
+        self.0.log.clone()
+    }
+
+    /// An error that holds all messages of the validation layer, if there are any.
+    ///
+    /// # Errors
+    /// [`Error::Device`] with the messages.
+    pub fn assert_clean(&self) -> Result<()> {
+        self.0.log.assert_clean()
+    }
+
+    /// Name and bytes of every buffer and image that is alive, sorted by name.
+    pub fn memory_report(&self) -> Vec<(String, u64)> {
+        self.0.memory.report()
+    }
+
+    /// Most bytes that buffers and images held at once.
+    pub fn memory_peak(&self) -> u64 {
+        self.0.memory.peak()
+    }
+}
+
+/// What [`Inner`] is put together from.
+struct Parts {
+    instance: ash::Instance,
+    physical: vk::PhysicalDevice,
+    info: DeviceInfo,
+    device: ash::Device,
+    family: u32,
+    queue: Option<vk::Queue>,
+    debug: bool,
+    log: ValidationLog,
+}
+
+impl Parts {
+    fn build(self, owned: Option<Owned>) -> Result<Gpu> {
+        let Self { instance, physical, info, device, family, queue, debug, log } = self;
+        // SAFETY: `physical` was enumerated from this instance.
+        let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+        let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits);
+        let memory = match Memory::new(&instance, physical, &device) {
+            Ok(memory) => memory,
+            Err(error) => {
+                if let Some(owned) = owned {
+                    // SAFETY: nothing was made of the device, and it is ours.
+                    unsafe { destroy(&device, &instance, owned) };
+                }
+                return Err(error);
+            }
+        };
+        Ok(Gpu(Arc::new(Inner {
+            memory: ManuallyDrop::new(memory),
+            push_descriptor: ash::khr::push_descriptor::Device::new(&instance, &device),
+            debug: debug.then(|| ash::ext::debug_utils::Device::new(&instance, &device)),
+            queue: queue.map(Mutex::new),
+            queue_family: family,
+            timestamp_mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0),
+            info,
+            physical,
+            log,
+            hazards: Mutex::default(),
+            next_id: AtomicU64::new(1),
+            owned,
+            device,
+            instance,
+        })))
+    }
+}
+
+impl Inner {
+    /// What is pending on all resources.
+    pub fn hazards(&self) -> MutexGuard<'_, Hazards> {
+        self.hazards.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A number that no other resource of this device has or had.
+    pub fn new_id(&self) -> ResourceId {
+        self.next_id.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Names an object for debuggers and for the validation layer's messages.
+    pub fn set_name(&self, object: impl Handle, name: &str) {
+        let Some(debug) = &self.debug else { return };
+        // A name with a zero byte inside cannot be passed on, and is only a name.
+        let Ok(name) = CString::new(name) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object is of this device and alive, as the caller has just made it. A failure loses the name only.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        // SAFETY: dropped once, here, before the device whose memory it frees. Everything made with the device holds an `Arc` of
+        // this and so is gone.
+        unsafe { ManuallyDrop::drop(&mut self.memory) };
+        if let Some(owned) = self.owned.take() {
+            // SAFETY: as above; the handles are ours.
+            unsafe { destroy(&self.device, &self.instance, owned) };
+        }
+    }
+}
+
+/// # Safety
+/// The handles must be ours and nothing made of them alive.
+unsafe fn destroy(device: &ash::Device, instance: &ash::Instance, owned: Owned) {
+    // SAFETY: the caller's promise; children go before parents.
+    unsafe {
+        device.destroy_device(None);
+        if let Some((messages, messenger)) = owned.messenger {
+            messages.destroy_debug_utils_messenger(messenger, None);
+        }
+        instance.destroy_instance(None);
+    }
+}

@@ -1,0 +1,175 @@
+//! What a device must have: one table that drives the check, the enabling and the documentation.
+
+use ash::vk;
+use std::ffi::CStr;
+
+/// Lowest Vulkan version of loader and device.
+pub const API_VERSION: u32 = vk::API_VERSION_1_3;
+
+/// Device extensions in use.
+pub const EXTENSIONS: &[&CStr] = &[ash::khr::push_descriptor::NAME];
+
+/// Feature structs of one device, to be asked for or enabled.
+#[derive(Default)]
+pub struct Features {
+    core: vk::PhysicalDeviceFeatures,
+    v11: vk::PhysicalDeviceVulkan11Features<'static>,
+    v13: vk::PhysicalDeviceVulkan13Features<'static>,
+}
+
+impl Features {
+    /// The features that a device for this crate must be created with; merge them into the host's own.
+    pub fn required() -> Self {
+        let mut features = Self::default();
+        for feature in FEATURES {
+            *(feature.field)(&mut features) = vk::TRUE;
+        }
+        features
+    }
+
+    /// The structs linked into a chain that `vkCreateDevice` and `vkGetPhysicalDeviceFeatures2` take.
+    pub fn chain(&mut self) -> vk::PhysicalDeviceFeatures2<'_> {
+        // A chain of an earlier call would dangle into a moved struct.
+        self.v11.p_next = std::ptr::null_mut();
+        self.v13.p_next = std::ptr::null_mut();
+        vk::PhysicalDeviceFeatures2::default()
+            .features(self.core)
+            .push_next(&mut self.v11)
+            .push_next(&mut self.v13)
+    }
+
+    /// Asks a device for what it can do.
+    pub(crate) fn of(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+        let mut features = Self::default();
+        let mut chain = features.chain();
+        // SAFETY: `device` was enumerated from `instance`, and the chained structs outlive the call.
+        unsafe { instance.get_physical_device_features2(device, &mut chain) };
+        features.core = chain.features;
+        features
+    }
+
+    /// Names and reasons of the required features that are missing here.
+    pub(crate) fn missing(&mut self) -> Vec<String> {
+        let absent = FEATURES.iter().filter(|f| *(f.field)(self) != vk::TRUE).collect::<Vec<_>>();
+        absent.iter().map(|f| format!("feature {} ({})", f.name, f.why)).collect()
+    }
+}
+
+/// One required feature.
+pub struct Feature {
+    /// Vulkan's name.
+    pub name: &'static str,
+    /// What it is needed for.
+    pub why: &'static str,
+    field: fn(&mut Features) -> &mut vk::Bool32,
+}
+
+/// Required features. All are in every desktop driver of Vulkan 1.3 and in lavapipe.
+pub const FEATURES: &[Feature] = &[
+    Feature { name: "synchronization2", why: "barriers", field: |f| &mut f.v13.synchronization2 },
+    Feature {
+        name: "dynamicRendering",
+        why: "drawing without render pass objects",
+        field: |f| &mut f.v13.dynamic_rendering,
+    },
+    Feature { name: "multiview", why: "both eyes in one pass", field: |f| &mut f.v11.multiview },
+    Feature {
+        name: "shaderStorageImageExtendedFormats",
+        why: "r8 storage images",
+        field: |f| &mut f.core.shader_storage_image_extended_formats,
+    },
+];
+
+/// One required use of a texel format, with optimal tiling.
+pub struct FormatNeed {
+    /// The format.
+    pub format: vk::Format,
+    /// What it must be capable of.
+    pub features: vk::FormatFeatureFlags,
+    /// What it is needed for.
+    pub why: &'static str,
+}
+
+const fn flags(list: &[vk::FormatFeatureFlags]) -> vk::FormatFeatureFlags {
+    let mut bits = 0;
+    let mut i = 0;
+    while i < list.len() {
+        bits |= list[i].as_raw();
+        i += 1;
+    }
+    vk::FormatFeatureFlags::from_raw(bits)
+}
+
+const LINEAR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
+const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+
+/// Required uses of formats.
+pub const FORMATS: &[FormatNeed] = &[
+    FormatNeed {
+        format: vk::Format::R32_SFLOAT,
+        features: flags(&[LINEAR, STORAGE, COLOUR]),
+        why: "values, opacities, ambient occlusion, depth layers",
+    },
+    FormatNeed {
+        format: vk::Format::R8_UNORM,
+        features: flags(&[LINEAR, STORAGE]),
+        why: "8-bit opacities and ambient occlusion",
+    },
+    FormatNeed { format: vk::Format::R8_UINT, features: STORAGE, why: "masks" },
+    FormatNeed { format: vk::Format::R32_UINT, features: STORAGE, why: "counters" },
+    FormatNeed {
+        format: vk::Format::R16G16B16A16_SFLOAT,
+        features: flags(&[LINEAR, STORAGE, COLOUR, vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND]),
+        why: "pictures",
+    },
+    FormatNeed {
+        format: vk::Format::D32_SFLOAT,
+        features: flags(&[
+            vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
+            vk::FormatFeatureFlags::SAMPLED_IMAGE,
+        ]),
+        why: "depth",
+    },
+];
+
+/// Everything that this device lacks, in words; empty for a usable one.
+pub(crate) fn missing(instance: &ash::Instance, device: vk::PhysicalDevice) -> Vec<String> {
+    // SAFETY: `device` was enumerated from `instance`.
+    let version = unsafe { instance.get_physical_device_properties(device) }.api_version;
+    if version < API_VERSION {
+        let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
+        return vec![format!("Vulkan 1.3 (has {major}.{minor})")];
+    }
+    let mut missing = Features::of(instance, device).missing();
+    // SAFETY: `device` was enumerated from `instance`.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default();
+    for wanted in EXTENSIONS {
+        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(wanted)) {
+            missing.push(format!("extension {}", wanted.to_string_lossy()));
+        }
+    }
+    for need in FORMATS {
+        // SAFETY: `device` was enumerated from `instance`.
+        let has = unsafe { instance.get_physical_device_format_properties(device, need.format) };
+        let lacks = need.features & !has.optimal_tiling_features;
+        if !lacks.is_empty() {
+            missing.push(format!("format {:?} with {lacks:?} ({})", need.format, need.why));
+        }
+    }
+    missing
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_feature_of_the_table_is_required_and_missing_when_absent() {
+        assert!(Features::required().missing().is_empty());
+        assert_eq!(Features::default().missing().len(), FEATURES.len());
+        let mut but_one = Features::required();
+        *(FEATURES[2].field)(&mut but_one) = vk::FALSE;
+        assert_eq!(but_one.missing(), ["feature multiview (both eyes in one pass)"]);
+    }
+}

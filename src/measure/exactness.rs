@@ -1,0 +1,163 @@
+//! The two central claims, as a measurement: contextual ambient occlusion equals a full recomputation bit for bit
+//! (CAO §4), and both eyes read the same ambient factor at the same point (CAO §5).
+
+use super::random::Random;
+use crate::Result;
+use crate::clip::{Clip, Mode, Pose, Shape};
+use crate::renderer::{Categories, Renderer};
+use crate::stage::compare::Difference;
+use crate::stage::eyes::Look;
+use crate::view::StereoRig;
+use glam::Vec3;
+
+/// What is tried.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Shapes to clip with.
+    pub shapes: Vec<Shape>,
+    /// Random poses of each shape.
+    pub poses: u32,
+    /// Seed of the poses and views.
+    pub seed: u64,
+}
+
+/// One clip and what it showed.
+#[derive(Clone, Debug)]
+pub struct Trial {
+    /// The clip.
+    pub clip: Clip,
+    /// Full against contextual.
+    pub difference: Difference,
+    /// Voxels of each category.
+    pub categories: Categories,
+}
+
+/// Left eye against right.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stereo {
+    /// Points of the volume that both eyes see.
+    pub points: u64,
+    /// Of these, points at which the ambient factors' bits differ.
+    pub different: u64,
+    /// Largest difference among them.
+    pub largest: f32,
+}
+
+/// Everything that was tried.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Each clip.
+    pub trials: Vec<Trial>,
+    /// All views together.
+    pub stereo: Stereo,
+}
+
+impl Report {
+    /// All trials together.
+    pub fn total(&self) -> Difference {
+        self.trials.iter().fold(Difference::default(), |sum, trial| Difference {
+            compared: sum.compared + trial.difference.compared,
+            different: sum.different + trial.difference.different,
+            largest: sum.largest.max(trial.difference.largest),
+            recomputed: sum.recomputed + trial.difference.recomputed,
+        })
+    }
+
+    /// Whether nothing differs, in any voxel or between the eyes.
+    pub fn exact(&self) -> bool {
+        self.total().different == 0 && self.stereo.different == 0
+    }
+}
+
+/// Points at which the eyes are compared, before asking which of them both eyes see.
+const CANDIDATES: u64 = 20_000;
+
+/// A point counts as seen when at least this much of its light reaches the eye.
+const SEEN: f32 = 0.3;
+
+/// Clips the renderer's volume with every shape at random poses, updates contextually, recomputes in full and compares.
+/// `progress` hears the share done.
+pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Report> {
+    let mut random = Random::new(plan.seed);
+    let total = (plan.shapes.len() as u32 * plan.poses).max(1);
+    let mut report = Report { trials: Vec::new(), stereo: Stereo::default() };
+    for shape in &plan.shapes {
+        for pose in 0..plan.poses {
+            let clip = random_clip(&mut random, renderer, shape, pose);
+            renderer.set_clips(std::slice::from_ref(&clip))?;
+            let done = f64::from(report.trials.len() as u32);
+            renderer.update(&mut |_| ())?;
+            let difference = renderer.verify(&mut |part| progress((done + part) / f64::from(total)))?;
+            report.trials.push(Trial { clip, difference, categories: renderer.categories()? });
+        }
+        let seen = compare_eyes(renderer, &mut random)?;
+        report.stereo.points += seen.points;
+        report.stereo.different += seen.different;
+        report.stereo.largest = report.stereo.largest.max(seen.largest);
+    }
+    Ok(report)
+}
+
+/// A random pose of a shape: in turn ordinary, across the border, tiny, covering everything, outside; either side hidden.
+pub fn random_clip(random: &mut Random, renderer: &Renderer, shape: &Shape, turn: u32) -> Clip {
+    let field = renderer.field();
+    let size = Vec3::from_array(std::array::from_fn(|i| field.dims[i] as f32 * field.spacing[i]));
+    let half = 0.5 * size.max_element();
+    let voxel = field.min_spacing();
+    let mut in_box = |edge: f32| Vec3::from_array([(); 3].map(|()| random.between(-0.5, 0.5))) * size * edge;
+    let (place, low, high) = match turn % 5 {
+        0 => (in_box(0.7), 0.15 * half, 0.6 * half),
+        1 => (in_box(1.3), 0.2 * half, 0.8 * half),
+        2 => (in_box(0.9), 0.3 * voxel, 1.5 * voxel),
+        3 => (in_box(0.1), 4.0 * half, 5.0 * half),
+        _ => (Vec3::splat(4.0 * half) + in_box(1.0), 0.2 * half, 0.5 * half),
+    };
+    // A mesh in a file has a size of its own; its pose scales that to the unit that shapes have.
+    let unit = match shape {
+        Shape::Mesh(mesh) => {
+            let (low, high) = mesh.bounds();
+            0.5 * (high - low).max_element()
+        }
+        _ => 1.0,
+    };
+    let scale = Vec3::from_array([(); 3].map(|()| random.between(low, high))) / unit;
+    let pose = Pose {
+        translate_mm: place,
+        rotate_deg: Vec3::from_array([(); 3].map(|()| random.between(-180.0, 180.0))),
+        scale: scale.max(Vec3::splat(1e-3)),
+    };
+    let mode = if random.below(3) == 0 { Mode::Keep } else { Mode::Remove };
+    Clip { shape: shape.clone(), mode, pose }
+}
+
+/// Compares what two eyes in a random place read at random points that have opacity and that both see.
+pub fn compare_eyes(renderer: &Renderer, random: &mut Random) -> Result<Stereo> {
+    let field = renderer.field();
+    let size: [f64; 3] = std::array::from_fn(|i| f64::from(field.dims[i] as f32 * field.spacing[i]));
+    let rig = StereoRig::framing(size, random.between(0.0, 360.0), random.between(-80.0, 80.0));
+    let far = 4.0 * (rig.position - rig.target).length();
+    let views = rig.views(1.0, far * 1e-3, far)?;
+
+    let opacity = renderer.read_opacity()?;
+    let mut points = Vec::new();
+    for _ in 0..CANDIDATES {
+        let voxel = random.below(opacity.len() as u64) as usize;
+        if opacity[voxel] > 0.05 {
+            let [x, y, _] = field.dims.map(|d| d as usize);
+            let index = Vec3::new((voxel % x) as f32, (voxel / x % y) as f32, (voxel / (x * y)) as f32);
+            let dims = Vec3::from_array(field.dims.map(|d| d as f32));
+            points.push((index - 0.5 * (dims - 1.0)) * Vec3::from_array(field.spacing));
+        }
+    }
+    let mut stereo = Stereo::default();
+    for [left, right] in renderer.seen_by_both(&views, &Look::default(), &points)? {
+        if left.transmittance >= SEEN && right.transmittance >= SEEN {
+            stereo.points += 1;
+            if left.ambient.to_bits() != right.ambient.to_bits() {
+                stereo.different += 1;
+                stereo.largest = stereo.largest.max((left.ambient - right.ambient).abs());
+            }
+        }
+    }
+    Ok(stereo)
+}

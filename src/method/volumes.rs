@@ -1,0 +1,91 @@
+//! The full-size volumes that methods read and write, and the kernels that fill them.
+
+use crate::Result;
+use crate::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use crate::occlusion::Occlusion;
+use crate::stage::bricks::{BrickList, Bricks};
+use crate::stage::classify::Classify;
+use crate::stage::field::Field;
+use crate::stage::lao::{Lao, Scope};
+
+/// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 12 a brick of 512.
+pub struct Volumes {
+    /// Opacity before clipping, r32float.
+    pub full_opacity: Image,
+    /// V_o: opacity after clipping, r32float.
+    pub opacity: Image,
+    /// V_m: category of each voxel, r8uint.
+    pub mask: Image,
+    /// V_PAO: ambient factor without clips, r32float.
+    pub precomputed: Image,
+    /// V_AO, r32float.
+    pub ambient: Image,
+    /// Bricks that the ray cast cannot skip, u32 each.
+    pub occupancy: Buffer,
+    /// Bricks that the last contextual update changed, u32 each.
+    pub changed_before: Buffer,
+    /// Bricks to work on.
+    pub list: BrickList,
+}
+
+impl Volumes {
+    /// Allocates them for a field; V_AO and V_PAO hold 1, nothing is clipped. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
+        let bricks = 4 * u64::from(field.brick_count());
+        let volumes = Self {
+            full_opacity: volume_image(gpu, "full opacity", field, Format::R32Float)?,
+            opacity: volume_image(gpu, "opacity", field, Format::R32Float)?,
+            mask: volume_image(gpu, "mask", field, Format::R8Uint)?,
+            precomputed: volume_image(gpu, "precomputed ambient", field, Format::R32Float)?,
+            ambient: volume_image(gpu, "ambient", field, Format::R32Float)?,
+            occupancy: gpu.buffer("occupancy", bricks, BufferUse::Device)?,
+            changed_before: gpu.buffer("changed before", bricks, BufferUse::Device)?,
+            list: BrickList::new(gpu, field)?,
+        };
+        let mut rec = gpu.recorder("clear volumes")?;
+        for image in
+            [&volumes.full_opacity, &volumes.opacity, &volumes.mask, &volumes.precomputed, &volumes.ambient]
+        {
+            rec.discard(image);
+        }
+        rec.barrier(&[], &[Access::TransferWrite]);
+        rec.clear_image(&volumes.precomputed, [1.0; 4])?;
+        rec.clear_image(&volumes.ambient, [1.0; 4])?;
+        rec.submit_and_wait()?;
+        Ok(volumes)
+    }
+}
+
+/// A 3D image of the field's size that kernels sample and store to.
+pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Result<Image> {
+    let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
+    gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
+}
+
+/// The kernels that methods share.
+pub struct Kernels {
+    /// Stage 4, and the reach of its clips.
+    pub classify: Classify,
+    /// Compaction.
+    pub bricks: Bricks,
+    /// Stages 1 and 5.
+    pub lao: Lao,
+}
+
+impl Kernels {
+    /// Builds the pipelines. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { classify: Classify::new(gpu)?, bricks: Bricks::new(gpu)?, lao: Lao::new(gpu)? })
+    }
+}
+
+/// What every method is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Rays, quadrature, radius.
+    pub occlusion: Occlusion,
+    /// Which voxels get a value.
+    pub scope: Scope,
+    /// Reference length of the opacity in mm.
+    pub reference_mm: f32,
+}

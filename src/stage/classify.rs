@@ -1,0 +1,109 @@
+//! Clip classification (CAO §3.5 step 4): opacity after clipping, anti-aliased by eq. (5),
+//! `O_AA = C_visible / (N + 9) · O_voxel`, and the category of every voxel.
+//!
+//! In: `full_opacity`, the clips with layers and dilation maps. Out: `opacity` V_o (3D r32float), `mask` V_m (3D r8uint: 0 = a
+//! clipped, 1 = b affected, 2 = c untouched), `count` of each. Cost: one distance a voxel and clip; 9 or 9 + N samples only
+//! for voxels within reach of a clip.
+
+use super::clips::ClipSet;
+use super::device_buffer;
+use super::field::Field;
+use crate::Result;
+use crate::gpu::{Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, shaders};
+use crate::layout_check;
+use crate::occlusion::Occlusion;
+use bytemuck::{Pod, Zeroable};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    extra_samples: u32,
+    spacing: [f32; 3],
+    reach: f32,
+    flags: u32,
+    pad: [u32; 3],
+}
+layout_check!(Params => shaders::classify::CLASSIFY_PARAMS { dims, extra_samples, spacing, reach, flags });
+
+/// Anti-aliasing samples of voxels that a clip surface passes through, beyond centre and corners: N of eq. (5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AntiAliasing {
+    /// None.
+    N0 = 0,
+    /// 8.
+    N8 = 8,
+    /// 32, as the paper has it.
+    N32 = 32,
+}
+
+/// The kernel `classify`.
+pub struct Classify {
+    pipeline: Pipeline,
+    positions: Buffer,
+    /// Voxels of category a, b, c after the last classification: three u32.
+    pub count: Buffer,
+}
+
+impl Classify {
+    /// Builds the pipeline and the table of sample positions. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            pipeline: gpu.compute(&shaders::classify::SHADER, "main")?,
+            positions: device_buffer(gpu, "sample positions", bytemuck::cast_slice(&sample_positions()))?,
+            count: gpu.buffer("category counts", 12, BufferUse::Device)?,
+        })
+    }
+
+    /// How far in mm a clip's change reaches: the longest ray, the eight voxels that its last sample interpolates, the
+    /// cell that one clip sample stands for, and a thousandth of a voxel for rounding (method.md §5).
+    pub fn reach(field: &Field, occlusion: &Occlusion) -> f32 {
+        occlusion.reach(f64::from(field.min_spacing())) + (1.5 + 1e-3) * field.diagonal()
+    }
+
+    /// Classifies every voxel. `count` must have been cleared.
+    #[expect(clippy::too_many_arguments, reason = "each is one binding or parameter of the kernel")]
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        clips: &ClipSet,
+        samples: AntiAliasing,
+        reach: f32,
+        literal: bool,
+        full_opacity: &Image,
+        opacity: &Image,
+        mask: &Image,
+    ) -> Result<()> {
+        let params = Params {
+            dims: field.dims,
+            extra_samples: samples as u32,
+            spacing: field.spacing,
+            reach,
+            flags: u32::from(literal),
+            pad: [0; 3],
+        };
+        let binds = [
+            ("full_opacity", Bind::Image(full_opacity)),
+            ("clips", Bind::Buffer(&clips.clips)),
+            ("layers", Bind::Buffer(&clips.layers)),
+            ("dilation", Bind::Buffer(&clips.dilation)),
+            ("positions", Bind::Buffer(&self.positions)),
+            ("opacity", Bind::Image(opacity)),
+            ("mask", Bind::Image(mask)),
+            ("count", Bind::Buffer(&self.count)),
+        ];
+        rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)
+    }
+}
+
+/// The N extra positions in the voxel's [−1, 1]³: points of the R3 sequence (Roberts 2018), whose every prefix is evenly
+/// spread, each followed by its mirror image, so that the mean of every even number of them is the centre.
+fn sample_positions() -> [[f32; 4]; 32] {
+    const G: f64 = 1.220_744_084_605_759_5;
+    std::array::from_fn(|k| {
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let u = |power: i32| (0.5 + (k / 2 + 1) as f64 / G.powi(power)).fract();
+        [1, 2, 3, 0].map(|axis| if axis == 0 { 0.0 } else { (side * (2.0 * u(axis) - 1.0)) as f32 })
+    })
+}

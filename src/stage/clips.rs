@@ -1,0 +1,288 @@
+//! The clips on the device (`spirv/shared/clips.wgsl`): shapes at their poses, and for meshes their depth layers and dilation
+//! maps (CAO §3.2–§3.4).
+//!
+//! The clip camera moves rigidly with a mesh, so its layers are drawn once and serve every translation and rotation; a new
+//! scale, radius or mesh draws them again.
+
+use super::dilate::Dilate;
+use super::peel::{Layers, MAX_PAIRS, Peel};
+use crate::clip::{Clip, ClipCamera, Mode, Shape};
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
+use crate::layout_check;
+use crate::mesh::TriangleMesh;
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use std::sync::Arc;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ClipData {
+    to_rigid: [[f32; 4]; 3],
+    scale: [f32; 4],
+    corner: [f32; 4],
+    kind: u32,
+    keep: u32,
+    pairs: u32,
+    layers_at: u32,
+    resolution: u32,
+    dilation_at: u32,
+    dilation_resolution: u32,
+    per_depth: f32,
+}
+layout_check!(ClipData => shaders::classify::CLIP {
+    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth
+});
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ClipsData {
+    count: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
+    clip: [ClipData; Clip::MAX],
+}
+layout_check!(ClipsData => shaders::classify::CLIPS { count, pad0, pad1, pad2, clip });
+
+/// Settings of the depth maps of clip meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapSettings {
+    /// Pixels along the edge of the depth layers.
+    pub resolution: u32,
+    /// Cells along the edge of the dilation maps; divides `resolution`.
+    pub cells: u32,
+    /// Most layer pairs, 1 … 8.
+    pub pairs: u32,
+    /// The paper's recipe instead of the conservative one: eq. (4) as printed, at the layers' resolution and with the ray's
+    /// length as radius. It leaves stale voxels; it exists to show that.
+    pub literal: bool,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        Self { resolution: 512, cells: 128, pairs: MAX_PAIRS, literal: false }
+    }
+}
+
+impl MapSettings {
+    fn check(&self) -> Result<()> {
+        let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
+        if !(8..=4096).contains(&self.resolution) {
+            return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
+        }
+        if self.cells == 0
+            || self.resolution % self.cells != 0
+            || (self.literal && self.cells != self.resolution)
+        {
+            let wanted = if self.literal {
+                "the depth map's resolution"
+            } else {
+                "a divisor of the depth map's resolution"
+            };
+            return refuse(
+                "dilation map resolution",
+                format!("{}; expected {wanted}, {}", self.cells, self.resolution),
+            );
+        }
+        if !(1..=MAX_PAIRS).contains(&self.pairs) {
+            return refuse("layer pairs", format!("{}; expected 1 … {MAX_PAIRS}", self.pairs));
+        }
+        Ok(())
+    }
+}
+
+/// Where one mesh clip's maps are in the shared buffers.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshClip {
+    /// The clip camera.
+    pub camera: ClipCamera,
+    /// Layer pairs.
+    pub pairs: u32,
+    /// Cells along the edge of the dilation maps.
+    pub cells: u32,
+    /// First f32 of the layers.
+    pub layers_at: u32,
+    /// First f32 of the dilation maps.
+    pub dilation_at: u32,
+    /// The outside is hidden.
+    pub keep: bool,
+    /// See [`MapSettings::literal`].
+    pub literal: bool,
+}
+
+/// The layers of a mesh at one scale and margin.
+struct Peeled {
+    mesh: Arc<TriangleMesh>,
+    scale: Vec3,
+    margin: f32,
+    settings: MapSettings,
+    layers: Layers,
+}
+
+/// The clips of a scene in device memory.
+pub struct ClipSet {
+    /// Bound as `clips`.
+    pub clips: Buffer,
+    /// Bound as `layers`.
+    pub layers: Buffer,
+    /// Bound as `dilation`.
+    pub dilation: Buffer,
+    peeled: Vec<Peeled>,
+    meshes: Vec<MeshClip>,
+    /// What the maps were made for: shape and side of each mesh clip, radius.
+    made_for: Vec<(Vec3, bool, f32)>,
+}
+
+impl ClipSet {
+    /// No clips.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            clips: gpu.buffer("clips", size_of::<ClipsData>() as u64, BufferUse::Device)?,
+            layers: gpu.buffer("clip layers", 16, BufferUse::Device)?,
+            dilation: gpu.buffer("dilation maps", 16, BufferUse::Device)?,
+            peeled: Vec::new(),
+            meshes: Vec::new(),
+            made_for: Vec::new(),
+        })
+    }
+
+    /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only
+    /// translations and rotations changed. `radius` in mm is the reach of a change: ray length, footprint and sample cell.
+    /// Uses the device's queue and waits for it when there is something to draw.
+    pub fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        peel: &Peel,
+        dilate: &Dilate,
+        clips: &[Clip],
+        radius: f32,
+        settings: MapSettings,
+    ) -> Result<()> {
+        check(clips)?;
+        settings.check()?;
+        let mut wanted = Vec::new();
+        for clip in clips {
+            if let Shape::Mesh(mesh) = &clip.shape {
+                wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep));
+            }
+        }
+        let key: Vec<_> = wanted.iter().map(|&(_, scale, keep)| (scale, keep, radius)).collect();
+        let same_layers = |have: &Peeled, (mesh, scale, _): &(&Arc<TriangleMesh>, Vec3, bool)| {
+            Arc::ptr_eq(&have.mesh, mesh)
+                && have.scale == *scale
+                && have.margin == radius
+                && have.settings == settings
+        };
+        let unchanged = key == self.made_for
+            && self.peeled.len() == wanted.len()
+            && self.peeled.iter().zip(&wanted).all(|(have, want)| same_layers(have, want));
+        if unchanged {
+            return Ok(());
+        }
+
+        let mut peeled = Vec::new();
+        for want in &wanted {
+            let (mesh, scale, _) = *want;
+            let found = self.peeled.iter().position(|have| same_layers(have, want));
+            peeled.push(match found {
+                Some(index) => self.peeled.swap_remove(index),
+                None => {
+                    mesh.closed()?;
+                    let camera = ClipCamera::around(mesh, scale, radius, settings.resolution);
+                    let layers = peel.run(gpu, mesh, scale, camera, settings.pairs)?;
+                    Peeled { mesh: mesh.clone(), scale, margin: radius, settings, layers }
+                }
+            });
+        }
+        self.peeled = peeled;
+        self.made_for = key;
+        self.meshes.clear();
+        let (mut layers_at, mut dilation_at) = (0, 0);
+        for (have, &(_, _, keep)) in self.peeled.iter().zip(&wanted) {
+            let pairs = have.layers.pairs;
+            self.meshes.push(MeshClip {
+                camera: have.layers.camera,
+                pairs,
+                cells: settings.cells,
+                layers_at,
+                dilation_at,
+                keep,
+                literal: settings.literal,
+            });
+            layers_at += 2 * pairs * settings.resolution * settings.resolution;
+            dilation_at += 2 * pairs * settings.cells * settings.cells;
+        }
+        if self.meshes.is_empty() {
+            return Ok(());
+        }
+        let all: Vec<f32> = self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
+        self.layers = super::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
+        self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
+        let most = self.meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
+        let blocks = Dilate::blocks(gpu, settings.cells, most)?;
+        let mut rec = gpu.recorder("dilate")?;
+        for mesh in &self.meshes {
+            rec.barrier(
+                &[Access::StorageRead, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
+            dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
+        }
+        rec.submit_and_wait()?;
+        Ok(())
+    }
+
+    /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
+    pub fn record(&self, rec: &mut Recorder, clips: &[Clip]) -> Result<()> {
+        check(clips)?;
+        let mut data = ClipsData::zeroed();
+        data.count = clips.len() as u32;
+        let mut meshes = self.meshes.iter();
+        for (slot, clip) in data.clip.iter_mut().zip(clips) {
+            let rows = clip.pose.rotation().transpose();
+            let moved = -(rows * clip.pose.translate_mm);
+            slot.to_rigid = std::array::from_fn(|i| rows.row(i).extend(moved[i]).to_array());
+            slot.scale = clip.pose.scale.extend(clip.pose.scale.min_element()).to_array();
+            slot.keep = u32::from(clip.mode == Mode::Keep);
+            slot.kind = match &clip.shape {
+                Shape::Plane => 0,
+                Shape::Box => 1,
+                Shape::Sphere => 2,
+                Shape::Cylinder => 3,
+                Shape::Cone => 4,
+                Shape::Torus => 5,
+                Shape::Mesh(mesh) => {
+                    let map = meshes.next().ok_or_else(|| Error::Config {
+                        what: format!("clip {}", mesh.name),
+                        problem: "its depth layers were not prepared".into(),
+                    })?;
+                    slot.corner = map.camera.corner.extend(1.0 / map.camera.pixel_mm).to_array();
+                    slot.pairs = map.pairs;
+                    slot.layers_at = map.layers_at;
+                    slot.resolution = map.camera.resolution;
+                    slot.dilation_at = map.dilation_at;
+                    slot.dilation_resolution = map.cells;
+                    slot.per_depth = 1.0 / map.camera.depth_mm;
+                    6
+                }
+            };
+        }
+        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
+        rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
+        Ok(())
+    }
+}
+
+fn check(clips: &[Clip]) -> Result<()> {
+    if clips.len() > Clip::MAX {
+        return Err(Error::Limit {
+            what: "clips".into(),
+            needed: clips.len() as u64,
+            limit: Clip::MAX as u64,
+            hint: "join meshes into one file, or leave some out".into(),
+        });
+    }
+    clips.iter().try_for_each(|clip| clip.pose.check())
+}

@@ -1,0 +1,79 @@
+//! Dilation maps of a mesh clip (CAO §3.4 step 3, eq. (4)): the Minkowski sum of its depth layers and a sphere, or for a kept
+//! shape the contraction by it.
+//!
+//! In: `layers` (`pairs` × front, back × Z² f32). Out: `dilation` (the same × D² f32), D dividing Z. Conservative: maps stand
+//! for cells, distances are between cells, so every point within the radius of any point of the layers is inside; the
+//! literal recipe (D = Z, distances between centres) is kept to show that it is not. Cost: (2·radius/cell)² reads a cell.
+
+use super::clips::MeshClip;
+use crate::Result;
+use crate::gpu::{Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder, shaders};
+use crate::layout_check;
+use bytemuck::{Pod, Zeroable};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    resolution: u32,
+    cells: u32,
+    layers_at: u32,
+    dilation_at: u32,
+    radius: f32,
+    cell_mm: f32,
+    depth_mm: f32,
+    flags: u32,
+}
+layout_check!(Params => shaders::dilate::DILATE_PARAMS {
+    resolution, cells, layers_at, dilation_at, radius, cell_mm, depth_mm, flags
+});
+
+/// The kernel `dilate`.
+pub struct Dilate {
+    reduce: Pipeline,
+    main: Pipeline,
+}
+
+impl Dilate {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            reduce: gpu.compute(&shaders::dilate::SHADER, "reduce")?,
+            main: gpu.compute(&shaders::dilate::SHADER, "main")?,
+        })
+    }
+
+    /// Working memory for one mesh: the hulls of the blocks.
+    pub fn blocks(gpu: &Gpu, cells: u32, pairs: u32) -> Result<Buffer> {
+        gpu.buffer("dilation blocks", 8 * u64::from(cells * cells) * u64::from(pairs), BufferUse::Device)
+    }
+
+    /// Fills the dilation maps of one mesh clip for this radius in mm.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        clip: &MeshClip,
+        radius: f32,
+        layers: &Buffer,
+        blocks: &Buffer,
+        dilation: &Buffer,
+    ) -> Result<()> {
+        let camera = clip.camera;
+        let params = Params {
+            resolution: camera.resolution,
+            cells: clip.cells,
+            layers_at: clip.layers_at,
+            dilation_at: clip.dilation_at,
+            radius,
+            cell_mm: camera.pixel_mm * (camera.resolution / clip.cells) as f32,
+            depth_mm: camera.depth_mm,
+            flags: u32::from(clip.keep) | u32::from(clip.literal) << 1,
+        };
+        let over = [clip.cells, clip.cells, clip.pairs];
+        let push = bytemuck::bytes_of(&params);
+        let binds = [("layers", Bind::Buffer(layers)), ("blocks", Bind::Buffer(blocks))];
+        rec.dispatch_over(&self.reduce, &binds, push, over)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+        let binds = [("blocks", Bind::Buffer(blocks)), ("dilation", Bind::Buffer(dilation))];
+        rec.dispatch_over(&self.main, &binds, push, over)
+    }
+}

@@ -1,0 +1,160 @@
+//! Eyes and frame settings on the device (`spirv/shared/eyes.wgsl`).
+
+use super::field::Field;
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
+use crate::layout_check;
+use crate::view::View;
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Eye {
+    origin: [f32; 4],
+    base: [f32; 4],
+    along_u: [f32; 4],
+    along_v: [f32; 4],
+    depth: [f32; 4],
+    view_projection: [[f32; 4]; 4],
+}
+layout_check!(Eye => shaders::raycast::EYE { origin, base, along_u, along_v, depth, view_projection });
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Frame {
+    eye: [Eye; 2],
+    dims: [f32; 4],
+    spacing: [f32; 4],
+    light: [f32; 4],
+    ambient: f32,
+    diffuse: f32,
+    opaque: f32,
+    bias: f32,
+    scale: f32,
+    occluded: f32,
+    jitter: f32,
+    gain: f32,
+}
+layout_check!(Frame => shaders::raycast::FRAME {
+    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, gain
+});
+
+/// How samples are lit and where they lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Part of the light that comes from everywhere; times the ambient factor.
+    pub ambient: f32,
+    /// Part of the light that depends on the surface's direction; times the ambient factor too.
+    pub diffuse: f32,
+    /// Direction towards the light in the world; the same for both eyes.
+    pub light: Vec3,
+    /// Distance between samples along a ray in mm; `None` is half the smallest spacing.
+    pub step_mm: Option<f32>,
+    /// Opacity at which a ray ends.
+    pub opaque: f32,
+    /// The ambient factor is shown times this. A flat wall's is 1/2, so that 2 shows it at full light; the paper's authors do
+    /// the same.
+    pub gain: f32,
+    /// Whether samples start at another fraction of a step in every pixel, against banding.
+    pub jitter: bool,
+    /// Whether the ambient factor is shown; without it the picture is the paper's "solid colour".
+    pub occluded: bool,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self {
+            ambient: 0.6,
+            diffuse: 0.6,
+            light: Vec3::new(-0.4, -0.7, 0.6),
+            step_mm: None,
+            opaque: 0.99,
+            gain: 2.0,
+            jitter: true,
+            occluded: true,
+        }
+    }
+}
+
+impl Look {
+    fn check(&self) -> Result<()> {
+        let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
+        for (what, value) in [
+            ("shading.ambient", self.ambient),
+            ("shading.diffuse", self.diffuse),
+            ("shading.gain", self.gain),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return refuse(what, format!("{value}; expected a number >= 0"));
+            }
+        }
+        if !(self.opaque > 0.0 && self.opaque <= 1.0) {
+            return refuse("shading.opaque", format!("{}; expected 0 < opacity <= 1", self.opaque));
+        }
+        if self.light.try_normalize().is_none() {
+            return refuse("shading.light", format!("{}; expected a direction", self.light));
+        }
+        match self.step_mm {
+            Some(step) if !(step.is_finite() && step > 0.0) => {
+                refuse("image.step_mm", format!("{step}; expected a length > 0 mm"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Both eyes and the frame's settings in device memory.
+pub struct FrameBuffer {
+    /// Bound as `frame`.
+    pub buffer: Buffer,
+}
+
+impl FrameBuffer {
+    /// Memory for one frame.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { buffer: gpu.buffer("frame", size_of::<Frame>() as u64, BufferUse::Device)? })
+    }
+
+    /// Writes the frame and makes it visible to all shaders.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        views: &[View; 2],
+        look: &Look,
+        reference_mm: f32,
+    ) -> Result<()> {
+        look.check()?;
+        let mut data = Frame::zeroed();
+        for (eye, view) in data.eye.iter_mut().zip(views) {
+            view.check()?;
+            let (origin, base) = view.ray(Vec2::ZERO);
+            let (n, f) = (view.near_mm, view.far_mm);
+            *eye = Eye {
+                origin: origin.extend(1.0).to_array(),
+                base: base.extend(0.0).to_array(),
+                along_u: (view.ray(Vec2::X).1 - base).extend(0.0).to_array(),
+                along_v: (view.ray(Vec2::Y).1 - base).extend(0.0).to_array(),
+                depth: [f / (f - n), -f * n / (f - n), n, f],
+                view_projection: view.view_projection().to_cols_array_2d(),
+            };
+        }
+        let step = look.step_mm.unwrap_or(0.5 * field.min_spacing());
+        data.dims = [field.dims[0] as f32, field.dims[1] as f32, field.dims[2] as f32, 0.0];
+        data.spacing = [field.spacing[0], field.spacing[1], field.spacing[2], step];
+        data.light = look.light.normalize().extend(reference_mm).to_array();
+        data.ambient = look.ambient;
+        data.diffuse = look.diffuse;
+        data.opaque = look.opaque;
+        data.bias = field.bias;
+        data.scale = field.scale;
+        data.occluded = f32::from(u8::from(look.occluded));
+        data.gain = look.gain;
+        data.jitter = f32::from(u8::from(look.jitter));
+        rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
+        rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);
+        Ok(())
+    }
+}

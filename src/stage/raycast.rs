@@ -1,0 +1,106 @@
+//! Stage 6 of CAO §3.5: both eyes by ray casting, in one multiview pass into a two-layer image.
+//!
+//! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i c_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, `L = A(x)·(k_a + k_d |n·l|)`. In: `volume`, `transfer`,
+//! `opacity` V_o (gradients), `ambient` V_AO, `occupancy`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
+//! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
+
+use super::clips::ClipSet;
+use super::eyes::FrameBuffer;
+use super::field::Field;
+use super::transfer::TransferBuffer;
+use crate::Result;
+use crate::gpu::{
+    Attachments, Bind, Buffer, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder,
+    Sampler, SamplerDesc, shaders,
+};
+use crate::layout_check;
+use bytemuck::{Pod, Zeroable};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    size: [f32; 2],
+}
+layout_check!(Params => shaders::raycast::RAYCAST_PARAMS { size });
+
+/// What the kernel reads.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// The volume.
+    pub field: &'a Field,
+    /// Transfer function.
+    pub transfer: &'a TransferBuffer,
+    /// V_o, clipped.
+    pub opacity: &'a Image,
+    /// V_AO.
+    pub ambient: &'a Image,
+    /// Bricks that can show something.
+    pub occupancy: &'a Buffer,
+    /// The clips.
+    pub clips: &'a ClipSet,
+    /// The frame.
+    pub frame: &'a FrameBuffer,
+}
+
+/// The kernel `raycast`.
+pub struct Raycast {
+    pipeline: Pipeline,
+    field: Sampler,
+    edge: Sampler,
+}
+
+impl Raycast {
+    /// Builds the pipeline for a colour attachment of this format and a depth attachment `D32Float`, two layers each.
+    pub fn new(gpu: &Gpu, colour: Format) -> Result<Self> {
+        Ok(Self {
+            pipeline: gpu.graphics(
+                &shaders::raycast::SHADER,
+                &GraphicsDesc {
+                    vertex: "vertex",
+                    fragment: "fragment",
+                    colours: &[colour],
+                    depth: Some(Format::D32Float),
+                    depth_test: DepthTest::Always,
+                    depth_write: true,
+                    cull: Cull::None,
+                    view_mask: 0b11,
+                    ..GraphicsDesc::default()
+                },
+            )?,
+            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
+            edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
+        })
+    }
+
+    /// Draws both eyes over the whole of both layers.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        bindings: Bindings,
+        colour: &Image,
+        depth: &Image,
+        size: [u32; 2],
+    ) -> Result<()> {
+        let b = bindings;
+        let params = Params { size: size.map(|s| s as f32) };
+        let binds = [
+            ("volume", Bind::Image(&b.field.volume)),
+            ("transfer", Bind::Buffer(&b.transfer.buffer)),
+            ("opacity", Bind::Image(b.opacity)),
+            ("ambient", Bind::Image(b.ambient)),
+            ("field", Bind::Sampler(&self.field)),
+            ("edge", Bind::Sampler(&self.edge)),
+            ("frame", Bind::Buffer(&b.frame.buffer)),
+            ("occupancy", Bind::Buffer(b.occupancy)),
+            ("clips", Bind::Buffer(&b.clips.clips)),
+            ("layers", Bind::Buffer(&b.clips.layers)),
+        ];
+        let attachments = Attachments {
+            colours: &[(colour, Some([0.0; 4]))],
+            depth: Some((depth, Some(1.0))),
+            layer: None,
+            size,
+        };
+        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 3)
+    }
+}
