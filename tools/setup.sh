@@ -96,7 +96,7 @@ has_certificates() {
 has_loader() {
   local ldconfig=ldconfig directory
   have ldconfig || ldconfig=/sbin/ldconfig # not on a Debian user's PATH
-  "$ldconfig" -p 2>/dev/null | grep -q 'libvulkan\.so\.1' && return 0
+  "$ldconfig" -p 2>/dev/null | grep 'libvulkan\.so\.1' >/dev/null && return 0 # no -q: it would break the pipe
   while read -r -d : directory; do
     if [ -n "$directory" ] && [ -e "$directory/libvulkan.so.1" ]; then return 0; fi
   done <<<"${LD_LIBRARY_PATH:-}:"
@@ -161,17 +161,22 @@ cao() {
   "$target_directory/release/cao" "$@"
 }
 
-# Sees to it that some Vulkan device answers; after build, because the program itself is asked.
+# Whether a device answers that lacks nothing.
+has_device() { cao devices --json 2>/dev/null | grep '"missing": *\[\]' >/dev/null; }
+
+# Sees to it that one does; after build, because the program itself is asked.
 setup_device() {
-  if cao devices >/dev/null 2>&1; then return 0; fi
+  if has_device; then return 0; fi
   if have apt-get && may_install; then
-    say "no Vulkan device answers; a software driver will do"
+    say "no usable Vulkan device answers; a software driver will do"
     install_software_driver
   else
     stop_missing driver
   fi
-  # Now let it speak: the reason is the user's only clue.
-  cao devices >/dev/null || stop "no Vulkan device answers, not even the software driver just installed"
+  if has_device; then return 0; fi
+  # Let the program speak: its reason is the user's only clue.
+  cao devices >&2 || true
+  stop "no usable Vulkan device answers, not even the software driver just installed"
 }
 
 # Mesa's software driver runs this program's kernels about three times faster from version 25 on, so an older
