@@ -419,16 +419,18 @@ impl Renderer {
     }
 
     /// Recomputes the ambient volume in full, beside the current one, and compares the two bit by bit on every voxel that has
-    /// a value. The ambient volume must be up to date. Uses the device's queue and waits for it.
-    pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<Difference> {
+    /// a value. Also returns the time of the full recomputation. The ambient volume must be up to date. Uses the device's queue
+    /// and waits for it.
+    pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<(Difference, Timings)> {
         let expected = volume_image(&self.gpu, "expected ambient", &self.field, Format::R32Float)?;
         let mut rec = self.gpu.recorder("expected")?;
         rec.discard(&expected);
         rec.submit_and_wait()?;
         let v = &self.volumes;
         let settings = self.settings();
-        lao::run(&self.gpu, &self.field, &self.kernels, v, &settings, &v.opacity, &expected, progress)?;
-        Compare::new(&self.gpu)?.run(
+        let timings =
+            lao::run(&self.gpu, &self.field, &self.kernels, v, &settings, &v.opacity, &expected, progress)?;
+        let difference = Compare::new(&self.gpu)?.run(
             &self.gpu,
             &self.field,
             self.setup.scope,
@@ -436,7 +438,8 @@ impl Renderer {
             &v.mask,
             &expected,
             &v.ambient,
-        )
+        )?;
+        Ok((difference, timings))
     }
 
     /// What the left and the right eye read at world points in mm, in the order given. The ambient volume must be up to date.

@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use cao::clip::{Clip, Mode, Pose, Shape};
 use cao::mesh::TriangleMesh;
 use cao::occlusion::{Quadrature, RaySet};
-use cao::scene::{Method, VolumeSource};
+use cao::scene::Method;
 use cao::volume::{self, Endian, Volume};
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
@@ -246,18 +246,6 @@ impl Raw {
             }
         }
     }
-}
-
-/// Opens the volume that a scene names.
-pub fn open_source(source: &VolumeSource) -> Result<Volume> {
-    Ok(match source {
-        VolumeSource::Builtin(spec) => volume::open(spec)?,
-        VolumeSource::File(path) => volume::read(path)?,
-        VolumeSource::Raw { path, dims, kind, spacing_mm, big_endian } => {
-            let endian = if *big_endian { Endian::Big } else { Endian::Little };
-            volume::read_raw(path, *dims, kind, endian, *spacing_mm)?
-        }
-    })
 }
 
 /// An analytic shape or a mesh file.

@@ -23,7 +23,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     override_scene(&mut scene, args, matches)?;
     let volume = match args.raw.dims {
         Some(_) => args.raw.open(&args.input)?,
-        None => args::open_source(&scene.volume)?,
+        None => scene.volume.open()?,
     };
     let transfer = match &args.settings.transfer {
         Some(spec) => TransferFunction::load(spec, volume.range())?,

@@ -63,6 +63,7 @@ fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
     out.line(format!("  voxels that differ  {:>12}", total.different));
     out.line(format!("  largest difference  {:>12}", total.largest));
     out.line(format!("  share recomputed    {share:>11.1} %"));
+    out.line(format!("  full / contextual   {:>11.2} x (median of times)", report.speedup()));
     let stereo = report.stereo;
     out.line(format!("  points both eyes see{:>12}", stereo.points));
     out.line(format!("  points that differ  {:>12}", stereo.different));
@@ -88,6 +89,7 @@ fn as_json(input: &str, report: &Report) -> serde_json::Value {
         "voxels_different": total.different,
         "largest_difference": total.largest,
         "share_recomputed": total.recomputed as f64 / total.compared.max(1) as f64,
+        "full_over_contextual_time": report.speedup(),
         "points_seen_by_both_eyes": report.stereo.points,
         "points_different": report.stereo.different,
         "largest_difference_between_eyes": report.stereo.largest,
