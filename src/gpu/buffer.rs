@@ -122,7 +122,9 @@ impl Buffer {
     fn mapped<T>(&self, offset: u64, length: u64, action: impl FnOnce(&mut [u8]) -> T) -> Result<T> {
         self.0.check_range(offset, length)?;
         let mut memory = self.0.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        let bytes = memory.as_mut().and_then(Allocation::mapped_slice_mut).ok_or_else(|| Error::Config {
+        // Where all memory is the processor's, device memory is mapped too; programs must not come to rely on that.
+        let mapped = if self.0.kind == BufferUse::Device { None } else { memory.as_mut() };
+        let bytes = mapped.and_then(Allocation::mapped_slice_mut).ok_or_else(|| Error::Config {
             what: format!("buffer {}", self.0.name),
             problem: "is in device memory; only Upload and Readback buffers are mapped".into(),
         })?;

@@ -2,8 +2,9 @@
 //!
 //! The rule: before a command touches memory that an earlier command touched, and one of the two writes, a barrier recorded in
 //! between must have named both accesses, `barrier(&[earlier], &[later])`. That is stricter than Vulkan, which orders pipeline
-//! stages and lets chains of barriers add up; naming both keeps each line true on its own. One exception: where a command reads *and*
-//! writes the same bytes, its write stands for both, because ordering one orders the other.
+//! stages and lets chains of barriers add up; naming both keeps each line true on its own. Two exceptions, where naming one says the other:
+//! where a command reads *and* writes the same memory, its write stands for both; and a write that readers were ordered after need not be
+//! named again by the next write, which must name the readers.
 //!
 //! Plain data, no device: images are ranges of layers, buffers ranges of bytes. Images also carry whether they have been
 //! moved from Vulkan's UNDEFINED layout to GENERAL, in which they then stay.
@@ -120,12 +121,24 @@ impl Hazards {
                 touch.name, touch.via
             ));
         }
-        let missing = state.pending.iter().find(|pending| {
+        let ordered = |pending: &Pending| pending.ordered & touch.access.bit() != 0;
+        // The latest first: its barrier may be all that is missing.
+        let missing = state.pending.iter().enumerate().rev().find(|(i, pending)| {
+            let writes = (pending.access.writes(), touch.access.writes());
+            let through_readers = || {
+                writes == (true, true)
+                    && state.pending[i + 1..].iter().any(|reader| {
+                        !reader.access.writes()
+                            && ordered(reader)
+                            && covers(&reader.range, &common(&pending.range, &touch.range))
+                    })
+            };
             overlap(&pending.range, &touch.range)
-                && (pending.access.writes() || touch.access.writes())
-                && pending.ordered & touch.access.bit() == 0
+                && writes != (false, false)
+                && !ordered(pending)
+                && !through_readers()
         });
-        missing.map_or(Ok(()), |pending| {
+        missing.map(|(_, pending)| pending).map_or(Ok(()), |pending| {
             Err(format!(
                 "{command} {} {} as `{}` while {} may still be {} it; add `rec.barrier(&[{:?}], &[{:?}])` between the two",
                 if touch.access.writes() { "writes" } else { "reads" },
@@ -141,13 +154,18 @@ impl Hazards {
 
     fn record(&mut self, command: &Arc<str>, touch: &Touch<'_>) {
         let state = self.resources.entry(touch.id).or_default();
-        let covers = |range: &Range<u64>| touch.range.start <= range.start && range.end <= touch.range.end;
-        if touch.access.writes() {
-            // Everything below it has been ordered before it: who waits for this write waits for those.
-            state.pending.retain(|pending| !covers(&pending.range));
-        } else {
-            state.pending.retain(|pending| pending.access != touch.access || !covers(&pending.range));
-        }
+        // What lies below a write has been ordered before it: who waits for the write waits for that. A read takes the place of
+        // reads of its own kind only.
+        let (before, kept): (Vec<_>, Vec<_>) = std::mem::take(&mut state.pending)
+            .into_iter()
+            .partition(|pending| touch.access.writes() || pending.access == touch.access);
+        let parts = before.into_iter().flat_map(|pending| {
+            let Range { start, end } = pending.range;
+            let left = start..end.min(touch.range.start);
+            let right = start.max(touch.range.end)..end;
+            [left, right].map(|range| Pending { range, ..pending.clone() })
+        });
+        state.pending = parts.filter(|part| !part.range.is_empty()).chain(kept).collect();
         state.pending.push(Pending {
             range: touch.range.clone(),
             access: touch.access,
@@ -177,6 +195,15 @@ impl Hazards {
 
 fn overlap(a: &Range<u64>, b: &Range<u64>) -> bool {
     a.start < b.end && b.start < a.end
+}
+
+fn covers(outer: &Range<u64>, inner: &Range<u64>) -> bool {
+    outer.start <= inner.start && inner.end <= outer.end
+}
+
+/// What two overlapping ranges have in common.
+fn common(a: &Range<u64>, b: &Range<u64>) -> Range<u64> {
+    a.start.max(b.start)..a.end.min(b.end)
 }
 
 /// Two bindings of one command that touch the same memory, one of them writing.
@@ -277,6 +304,30 @@ mod tests {
         h.command("b", &in_place).unwrap_err();
         h.barrier(&[StorageWrite], &[StorageRead, StorageWrite]);
         h.command("b", &in_place).unwrap();
+    }
+
+    #[test]
+    fn a_write_after_readers_names_the_readers_only_if_they_read_all_of_it() {
+        let mut h = state();
+        h.command("write", &[touch(TransferWrite)]).unwrap();
+        h.barrier(&[TransferWrite], &[StorageRead]);
+        let mut part = h.clone();
+        h.command("read", &[touch(StorageRead)]).unwrap();
+        h.barrier(&[StorageRead], &[StorageWrite]);
+        h.command("write again", &[touch(StorageWrite)]).unwrap();
+        part.command("read", &[Touch { range: 0..8, ..touch(StorageRead) }]).unwrap();
+        part.barrier(&[StorageRead], &[StorageWrite]);
+        part.command("write again", &[touch(StorageWrite)]).unwrap_err();
+        part.command("write what was read", &[Touch { range: 2..6, ..touch(StorageWrite) }]).unwrap();
+    }
+
+    #[test]
+    fn readers_from_before_a_write_do_not_order_it() {
+        let mut h = state();
+        h.command("read", &[touch(StorageRead)]).unwrap();
+        h.barrier(&[StorageRead], &[StorageWrite, TransferWrite]);
+        h.command("write part", &[Touch { range: 0..8, ..touch(TransferWrite) }]).unwrap();
+        h.command("write part", &[Touch { range: 0..8, ..touch(StorageWrite) }]).unwrap_err();
     }
 
     #[test]

@@ -16,7 +16,6 @@ pub(crate) struct Memory(Mutex<State>);
 
 struct State {
     allocator: Allocator,
-    now: u64,
     peak: u64,
 }
 
@@ -35,7 +34,7 @@ impl Memory {
         });
         let allocator =
             allocator.map_err(|e| Error::Device { problem: format!("cannot manage device memory: {e}") })?;
-        Ok(Self(Mutex::new(State { allocator, now: 0, peak: 0 })))
+        Ok(Self(Mutex::new(State { allocator, peak: 0 })))
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -63,16 +62,14 @@ impl Memory {
             bytes: requirements.size,
             problem: e.to_string(),
         })?;
-        state.now += allocation.size();
-        state.peak = state.peak.max(state.now);
+        // The report counts alignment too, as `Allocation::size` does not.
+        state.peak = state.peak.max(state.allocator.generate_report().total_allocated_bytes);
         Ok(allocation)
     }
 
     pub fn free(&self, allocation: Allocation) {
-        let mut state = self.lock();
-        state.now -= allocation.size();
         // The allocator only fails for memory that is not its own.
-        let freed = state.allocator.free(allocation);
+        let freed = self.lock().allocator.free(allocation);
         debug_assert!(freed.is_ok(), "{freed:?}");
     }
 

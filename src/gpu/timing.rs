@@ -126,7 +126,7 @@ impl Stages {
 /// Only the bits of the mask count, and the counter may have wrapped round once between the two.
 fn milliseconds(begin: u64, end: u64, mask: u64, period_ns: f64) -> f64 {
     let ticks = (end & mask).wrapping_sub(begin & mask) & mask;
-    ticks as f64 * period_ns * 1e-6
+    ticks as f64 * period_ns / 1e6
 }
 
 impl Drop for Stages {
