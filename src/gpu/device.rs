@@ -62,7 +62,6 @@ pub(crate) struct Inner {
     pub instance: ash::Instance,
     pub log: ValidationLog,
     hazards: Mutex<Hazards>,
-
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
     /// The loaded library, which all function pointers point into.
@@ -342,7 +341,6 @@ impl Parts {
             physical,
             log,
             hazards: Mutex::default(),
-
             owned,
             _entry: entry,
             device,
