@@ -62,7 +62,6 @@ pub(crate) struct Inner {
     pub instance: ash::Instance,
     pub log: ValidationLog,
     hazards: Mutex<Hazards>,
-    next_id: AtomicU64,
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
     /// The loaded library, which all function pointers point into.
@@ -342,7 +341,6 @@ impl Parts {
             physical,
             log,
             hazards: Mutex::default(),
-            next_id: AtomicU64::new(1),
             owned,
             _entry: entry,
             device,
@@ -357,9 +355,10 @@ impl Inner {
         self.hazards.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A number that no other resource of this device has or had.
-    pub fn new_id(&self) -> ResourceId {
-        self.next_id.fetch_add(1, Ordering::Relaxed)
+    /// A number that no other resource of any device has or had.
+    pub fn new_id() -> ResourceId {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        NEXT.fetch_add(1, Ordering::Relaxed)
     }
 
     /// Names an object for debuggers and for the validation layer's messages.
