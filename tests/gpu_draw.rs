@@ -254,6 +254,8 @@ fn what_does_not_fit_is_refused_by_name() {
         (GraphicsDesc { depth_write: true, ..good }, "no depth attachment"),
         (GraphicsDesc { depth: Some(Format::R32Float), ..good }, "colour format"),
         (GraphicsDesc { colours: &[Format::D32Float], ..good }, "depth format"),
+        (GraphicsDesc { colours: &[Format::R32Float; 5], ..good }, "4 colour"),
+        (GraphicsDesc { view_mask: 0b100_0000, ..good }, "6 views"),
     ] {
         let message = problem(gpu.graphics(shader, &desc).map(drop));
         assert!(message.contains(word), "{message}");

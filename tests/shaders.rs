@@ -195,6 +195,13 @@ fn no_shader_at_all_is_fine() {
 }
 
 #[test]
+fn a_name_that_is_no_rust_module_is_refused() {
+    let folder = files(&[("two-words.wgsl", "@compute @workgroup_size(1) fn main() {}")]);
+    let errors = compile::folder(folder.path(), UNCHECKED).unwrap_err();
+    assert!(errors[0].contains("two-words.wgsl"), "{errors:?}");
+}
+
+#[test]
 fn the_errors_of_all_shaders_are_reported_together() {
     let folder = files(&[
         ("a.wgsl", "fn f() -> { }"),
@@ -303,6 +310,7 @@ fn a_barrier_that_some_invocations_miss_is_refused() {
         "if i > 3u { return; } x[i] = i; workgroupBarrier();",
         "if i > 3u { return; } x[i] = i; wait();",
         "for (var k = 0u; k < 4u; k++) { if x[k] == i { return; } } storageBarrier();",
+        "for (var k = 0u; k < 4u; k++) { workgroupBarrier(); if x[k] == i { return; } }",
         "if i > 3u { workgroupBarrier(); }",
         "if n > 3u { if x[i] == 0u { wait(); } }",
         "switch i { case 1u: { workgroupBarrier(); } default: {} }",
