@@ -2,8 +2,9 @@
 
 struct OpacityParams {
     dims: vec3<u32>,
-    // value = texel * scale + bias
-    scale: f32,
+    // value = stored * slope + bias; stored integers of a UNORM texel, 1: the texel is the stored value
+    levels: f32,
+    slope: f32,
     bias: f32,
 }
 
@@ -18,6 +19,9 @@ fn main(@builtin(global_invocation_id) voxel: vec3<u32>) {
     if any(voxel >= params.dims) {
         return;
     }
-    let value = textureLoad(volume, voxel, 0).r * params.scale + params.bias;
+    // A UNORM texel is a rounded quotient; rounded back to the integer that the file holds, so that it falls on the right
+    // side of a step of the transfer function.
+    let texel = textureLoad(volume, voxel, 0).r;
+    let value = select(texel, round(texel * params.levels), params.levels > 1.0) * params.slope + params.bias;
     textureStore(full_opacity, voxel, vec4(opacity_of(value), 0.0, 0.0, 0.0));
 }

@@ -114,6 +114,8 @@ pub struct Renderer {
     setup: Setup,
     clips: Vec<Clip>,
     stale: Stale,
+    /// Times of preparing clip meshes since the last update.
+    prepared: Timings,
 }
 
 impl Renderer {
@@ -146,6 +148,7 @@ impl Renderer {
             setup,
             clips: Vec::new(),
             stale: Stale { opacity: true, rays: true, precomputed: true, ambient: true },
+            prepared: Timings::new(),
         })
     }
 
@@ -181,7 +184,10 @@ impl Renderer {
     fn prepare_clips(&mut self) -> Result<()> {
         let radius = self.map_radius();
         let maps = self.setup.maps;
-        self.clip_set.prepare(&self.gpu, &self.peel, &self.dilate, &self.clips, radius, maps)
+        let timings =
+            self.clip_set.prepare(&self.gpu, &self.peel, &self.dilate, &self.clips, radius, maps)?;
+        self.prepared.extend(timings);
+        Ok(())
     }
 
     /// The literal recipe dilates by the ray's length alone.
@@ -237,10 +243,10 @@ impl Renderer {
     }
 
     /// The same on the device's own queue, in parts, telling `progress` the share done of each full computation. Waits for
-    /// the end; returns the time of each stage in ms.
+    /// the end; returns the time of each stage in ms, clip meshes prepared since the last update included.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
         let settings = self.settings();
-        let mut timings = Timings::new();
+        let mut timings = std::mem::take(&mut self.prepared);
         if self.stale.opacity || self.stale.rays {
             let mut rec = self.gpu.recorder("opacity")?;
             self.record_opacity(&mut rec)?;

@@ -115,6 +115,11 @@ const SAMPLER: &str = "
 fn reflection_says_what_each_entry_point_touches() {
     let s = compile_text(SAMPLER).unwrap();
     assert_valid(&s, "SAMPLER");
+    let folder = files(&[("main.wgsl", SAMPLER)]);
+    assert_valid(
+        &compile::file(&folder.path().join("main.wgsl"), CHECKED).unwrap(),
+        "SAMPLER with bounds checks",
+    );
     let names: Vec<_> = s.bindings.iter().map(|b| (b.binding, b.name.as_str())).collect();
     let expected = [
         (0, "lengths"),
@@ -192,6 +197,13 @@ fn the_emitted_rust_is_the_same_for_the_same_sources() {
 fn no_shader_at_all_is_fine() {
     assert_eq!(compile::folder(Path::new("no such folder"), UNCHECKED).unwrap(), "");
     assert_eq!(compile::folder(files(&[]).path(), UNCHECKED).unwrap(), "");
+}
+
+#[test]
+fn a_name_that_is_no_rust_module_is_refused() {
+    let folder = files(&[("two-words.wgsl", "@compute @workgroup_size(1) fn main() {}")]);
+    let errors = compile::folder(folder.path(), UNCHECKED).unwrap_err();
+    assert!(errors[0].contains("two-words.wgsl"), "{errors:?}");
 }
 
 #[test]
@@ -303,6 +315,7 @@ fn a_barrier_that_some_invocations_miss_is_refused() {
         "if i > 3u { return; } x[i] = i; workgroupBarrier();",
         "if i > 3u { return; } x[i] = i; wait();",
         "for (var k = 0u; k < 4u; k++) { if x[k] == i { return; } } storageBarrier();",
+        "for (var k = 0u; k < 4u; k++) { workgroupBarrier(); if x[k] == i { return; } }",
         "if i > 3u { workgroupBarrier(); }",
         "if n > 3u { if x[i] == 0u { wait(); } }",
         "switch i { case 1u: { workgroupBarrier(); } default: {} }",

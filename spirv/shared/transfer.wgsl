@@ -1,4 +1,5 @@
-// Transfer function: piecewise linear between control points, constant beyond the first and the last.
+// Transfer function: piecewise linear between control points, constant beyond the first and the last. Two points of equal
+// value make a step; at the value itself the second holds.
 
 struct Transfer {
     opacity_points: u32,
@@ -15,13 +16,14 @@ struct Transfer {
 
 fn opacity_of(value: f32) -> f32 {
     var point = transfer.opacity[0];
-    if value <= point.x {
+    if value < point.x {
         return point.y;
     }
     for (var i = 1u; i < transfer.opacity_points; i++) {
         let next = transfer.opacity[i];
         if value < next.x {
-            return point.y + (value - point.x) * point.z;
+            // Kept between its ends: rounding must not leave 0 ... 1 or exceed what `largest_opacity` promises.
+            return clamp(point.y + (value - point.x) * point.z, min(point.y, next.y), max(point.y, next.y));
         }
         point = next;
     }
@@ -42,7 +44,7 @@ fn largest_opacity(low: f32, high: f32) -> f32 {
 
 fn colour_of(value: f32) -> vec3<f32> {
     var point = transfer.colour[0];
-    if value <= point.x {
+    if value < point.x {
         return point.yzw;
     }
     for (var i = 1u; i < transfer.colour_points; i++) {

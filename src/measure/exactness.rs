@@ -31,10 +31,10 @@ pub struct Trial {
     pub difference: Difference,
     /// Voxels of each category.
     pub categories: Categories,
-    /// Time of the contextual update, classification included, ms.
-    pub contextual_ms: f64,
-    /// Time of the full recomputation of the same volume, ms.
-    pub full_ms: f64,
+    /// Stages of the contextual update, classification included, ms.
+    pub contextual: Timings,
+    /// Stages of the full recomputation of the same volume, ms.
+    pub full: Timings,
 }
 
 /// Left eye against right.
@@ -71,7 +71,7 @@ impl Report {
     /// Median over the trials of full time / contextual time.
     pub fn speedup(&self) -> f64 {
         let mut ratios: Vec<f64> =
-            self.trials.iter().map(|t| t.full_ms / t.contextual_ms.max(1e-6)).collect();
+            self.trials.iter().map(|t| sum(&t.full) / sum(&t.contextual).max(1e-6)).collect();
         ratios.sort_by(f64::total_cmp);
         ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
     }
@@ -102,15 +102,14 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
             let contextual = renderer.update(&mut |_| ())?;
             let (difference, full) =
                 renderer.verify(&mut |part| progress((done + part) / f64::from(total)))?;
-            let sum = |timings: Timings| timings.iter().map(|(_, ms)| ms).sum();
             // The first update also computes V_PAO, which belongs to neither.
             let contextual = contextual.into_iter().filter(|(stage, _)| !stage.starts_with("precompute"));
             report.trials.push(Trial {
                 clip,
                 difference,
                 categories: renderer.categories()?,
-                contextual_ms: sum(contextual.collect()),
-                full_ms: sum(full),
+                contextual: contextual.collect(),
+                full,
             });
         }
         let seen = compare_eyes(renderer, &mut random)?;
@@ -119,6 +118,10 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
         report.stereo.largest = report.stereo.largest.max(seen.largest);
     }
     Ok(report)
+}
+
+fn sum(timings: &Timings) -> f64 {
+    timings.iter().map(|(_, ms)| ms).sum()
 }
 
 /// A random pose of a shape: in turn ordinary, across the border, tiny, covering everything, outside; either side hidden.

@@ -23,6 +23,8 @@ pub struct Field {
     pub scale: f32,
     /// See [`Self::scale`].
     pub bias: f32,
+    /// Stored integers of a UNORM texel, 255 or 65535: `stored = round(texel · levels)`; 1 where a texel is the value itself.
+    pub levels: f32,
 }
 
 impl Field {
@@ -69,6 +71,7 @@ impl Field {
             volume: image,
             scale: (scale * slope) as f32,
             bias: (bias * slope + intercept) as f32,
+            levels: scale as f32,
         })
     }
 

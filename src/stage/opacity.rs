@@ -13,11 +13,12 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
     dims: [u32; 3],
-    scale: f32,
+    levels: f32,
+    slope: f32,
     bias: f32,
-    pad: [u32; 3],
+    pad: [u32; 2],
 }
-layout_check!(Params => shaders::opacity::OPACITY_PARAMS { dims, scale, bias });
+layout_check!(Params => shaders::opacity::OPACITY_PARAMS { dims, levels, slope, bias });
 
 /// The kernel `opacity`.
 pub struct Opacity {
@@ -38,7 +39,8 @@ impl Opacity {
         transfer: &TransferBuffer,
         full_opacity: &Image,
     ) -> Result<()> {
-        let params = Params { dims: field.dims, scale: field.scale, bias: field.bias, pad: [0; 3] };
+        let Field { dims, levels, bias, .. } = *field;
+        let params = Params { dims, levels, slope: field.scale / levels, bias, pad: [0; 2] };
         let binds = [
             ("volume", Bind::Image(&field.volume)),
             ("transfer", Bind::Buffer(&transfer.buffer)),

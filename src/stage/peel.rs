@@ -39,6 +39,8 @@ pub struct Layers {
     pub pairs: u32,
     /// `pairs` × (front, back) × resolution² depths, rows of y, x fastest; empty pixels 1.
     pub depth: Vec<f32>,
+    /// Time that drawing them took on the device.
+    pub milliseconds: f64,
 }
 
 /// The kernel `peel`.
@@ -95,6 +97,7 @@ impl Peel {
         let edge = camera.resolution;
         let map_bytes = u64::from(edge) * u64::from(edge) * 4;
         let read_back = gpu.buffer("layer read-back", map_bytes, BufferUse::Readback)?;
+        let mut milliseconds = 0.0;
         let mut maps: [Vec<Vec<f32>>; 2] = [Vec::new(), Vec::new()];
         for (pipeline, maps) in [&self.front, &self.back].into_iter().zip(&mut maps) {
             let mut before = depth_image(gpu, edge)?;
@@ -114,6 +117,7 @@ impl Peel {
                 }
                 rec.discard(&now);
                 rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead]);
+                rec.stage("peel")?;
                 rec.draw(
                     pipeline,
                     &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
@@ -126,10 +130,11 @@ impl Peel {
                     },
                     corners.len() as u32,
                 )?;
+                rec.end_stage()?;
                 rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
                 rec.copy_image_to_buffer(&now, 0, [0; 3], [edge, edge, 1], &read_back, 0)?;
                 rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-                rec.submit_and_wait()?;
+                milliseconds += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
                 let map: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
                 if map.iter().all(|&z| z >= 1.0) {
                     break;
@@ -147,7 +152,7 @@ impl Peel {
             .flatten()
             .copied()
             .collect();
-        Ok(Layers { camera, pairs, depth })
+        Ok(Layers { camera, pairs, depth, milliseconds })
     }
 }
 

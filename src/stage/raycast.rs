@@ -101,6 +101,6 @@ impl Raycast {
             layer: None,
             size,
         };
-        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 3)
+        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 6)
     }
 }

@@ -85,11 +85,25 @@ fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
     }
 }
 
+fn stages(timings: &[(String, f64)]) -> serde_json::Value {
+    timings.iter().map(|(stage, ms)| (stage.clone(), serde_json::Value::from(*ms))).collect()
+}
+
 fn as_json(input: &str, report: &Report) -> serde_json::Value {
     let total = report.total();
     json!({
         "volume": input,
-        "clips": report.trials.len(),
+        "clips": report.trials.iter().map(|trial| json!({
+            "shape": trial.clip.shape.name(),
+            "mode": format!("{:?}", trial.clip.mode).to_lowercase(),
+            "translate_mm": trial.clip.pose.translate_mm.to_array(),
+            "rotate_deg": trial.clip.pose.rotate_deg.to_array(),
+            "scale": trial.clip.pose.scale.to_array(),
+            "voxels_different": trial.difference.different,
+            "affected": trial.categories.affected,
+            "contextual_ms": stages(&trial.contextual),
+            "full_ms": stages(&trial.full),
+        })).collect::<Vec<_>>(),
         "voxels_compared": total.compared,
         "voxels_different": total.different,
         "largest_difference": total.largest,
