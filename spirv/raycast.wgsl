@@ -35,10 +35,20 @@ struct Pixel {
 
 var<immediate> params: RaycastParams;
 
-// One triangle that covers the image.
+// Two triangles that make a rectangle of the whole image: one large triangle would do, but the software driver of Mesa 22.3
+// forgets the view of triangles that are not half of an upright rectangle.
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
-    return vec4(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+    let right = index == 2u || index == 3u || index == 5u;
+    let below = index == 1u || index == 4u || index == 5u;
+    return vec4(select(-1.0, 1.0, right), select(-1.0, 1.0, below), 0.0, 1.0);
+}
+
+// Halvings of a step at a cut: to 1/16 of it.
+const CUT_HALVINGS = 4u;
+
+fn value_at(position: vec3<f32>) -> f32 {
+    return textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r * frame.scale + frame.bias;
 }
 
 fn opacity_at(position: vec3<f32>) -> f32 {
@@ -88,6 +98,7 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
     var alpha = 0.0;
     var depth = 1.0;
     var k = 0.0;
+    var hidden = -1.0;
     loop {
         let t = t_begin + (k + phase) * step;
         if !(t < t_end) || alpha >= frame.opaque {
@@ -107,22 +118,37 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
             continue;
         }
         k += 1.0;
-        let value = textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r * frame.scale + frame.bias;
+        if opacity_of(value_at(position)) <= 0.0 {
+            continue;
+        }
+        if !visible(eye.origin.xyz + t * direction) {
+            hidden = k;
+            continue;
+        }
+        // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
+        // one depth and shows no rings.
+        var t_shown = t;
+        if hidden == k - 1.0 {
+            var t_hidden = t - step;
+            for (var i = 0u; i < CUT_HALVINGS; i++) {
+                let middle = 0.5 * (t_hidden + t_shown);
+                if visible(eye.origin.xyz + middle * direction) {
+                    t_shown = middle;
+                } else {
+                    t_hidden = middle;
+                }
+            }
+        }
+        let shown = start + t_shown * along;
+        let value = value_at(shown);
         let a = opacity_of(value);
-        if a <= 0.0 {
-            continue;
-        }
-        let world = eye.origin.xyz + t * direction;
-        if !visible(world) {
-            continue;
-        }
         let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
-        let light = frame.ambient + frame.diffuse * surface_light(position);
-        let shade = light * mix(1.0, ambient_at(position), frame.occluded);
+        let light = frame.ambient + frame.diffuse * surface_light(shown);
+        let shade = light * mix(1.0, frame.gain * ambient_at(shown), frame.occluded);
         colour += (1.0 - alpha) * covered * shade * colour_of(value);
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
-            depth = eye.depth.x + eye.depth.y / t;
+            depth = eye.depth.x + eye.depth.y / t_shown;
         }
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));

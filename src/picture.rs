@@ -18,8 +18,7 @@ pub struct Picture {
 impl Picture {
     /// Composites premultiplied linear pixels over a linear background and encodes them as sRGB.
     pub fn over(width: u32, height: u32, colour: &[[f32; 4]], background: [f32; 3]) -> Self {
-        let over =
-            |p: &[f32; 4]| std::array::from_fn(|i| encode(p[i] + (1.0 - p[3]) * background[i]));
+        let over = |p: &[f32; 4]| std::array::from_fn(|i| encode(p[i] + (1.0 - p[3]) * background[i]));
         Self { width, height, pixels: colour.iter().map(over).collect() }
     }
 

@@ -13,8 +13,8 @@ use crate::gpu::{
 };
 use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
 use crate::method::{cao, lao};
-use crate::scene::Method;
 use crate::occlusion::Occlusion;
+use crate::scene::Method;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
 use crate::stage::compare::{Compare, Difference};
@@ -114,6 +114,8 @@ pub struct Renderer {
     setup: Setup,
     clips: Vec<Clip>,
     stale: Stale,
+    /// Times of preparing clip meshes since the last update.
+    prepared: Timings,
 }
 
 impl Renderer {
@@ -146,6 +148,7 @@ impl Renderer {
             setup,
             clips: Vec::new(),
             stale: Stale { opacity: true, rays: true, precomputed: true, ambient: true },
+            prepared: Timings::new(),
         })
     }
 
@@ -181,7 +184,10 @@ impl Renderer {
     fn prepare_clips(&mut self) -> Result<()> {
         let radius = self.map_radius();
         let maps = self.setup.maps;
-        self.clip_set.prepare(&self.gpu, &self.peel, &self.dilate, &self.clips, radius, maps)
+        let timings =
+            self.clip_set.prepare(&self.gpu, &self.peel, &self.dilate, &self.clips, radius, maps)?;
+        self.prepared.extend(timings);
+        Ok(())
     }
 
     /// The literal recipe dilates by the ray's length alone.
@@ -237,10 +243,10 @@ impl Renderer {
     }
 
     /// The same on the device's own queue, in parts, telling `progress` the share done of each full computation. Waits for
-    /// the end; returns the time of each stage in ms.
+    /// the end; returns the time of each stage in ms, clip meshes prepared since the last update included.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
         let settings = self.settings();
-        let mut timings = Timings::new();
+        let mut timings = std::mem::take(&mut self.prepared);
         if self.stale.opacity || self.stale.rays {
             let mut rec = self.gpu.recorder("opacity")?;
             self.record_opacity(&mut rec)?;
@@ -264,9 +270,7 @@ impl Renderer {
             timings.extend(rec.submit_and_wait()?);
             if self.setup.method == Method::Lao {
                 let (from, to) = (&volumes.opacity, &volumes.ambient);
-                timings.extend(lao::run(
-                    &self.gpu, field, kernels, volumes, &settings, from, to, progress,
-                )?);
+                timings.extend(lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?);
             }
         }
         self.updated();
@@ -290,12 +294,7 @@ impl Renderer {
                 &[Access::StorageWrite, Access::SampledRead],
             );
             rec.stage("opacity")?;
-            self.opacity.record(
-                rec,
-                &self.field,
-                &self.transfer_buffer,
-                &self.volumes.full_opacity,
-            )?;
+            self.opacity.record(rec, &self.field, &self.transfer_buffer, &self.volumes.full_opacity)?;
             rec.end_stage()?;
             rec.stage("occupancy")?;
             self.occupancy.record(rec, &self.field, &self.transfer_buffer, &self.volumes.occupancy)?;
@@ -310,7 +309,7 @@ impl Renderer {
         rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(&self.volumes.changed_before, 0, self.volumes.changed_before.bytes(), 1)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-    Ok(())
+        Ok(())
     }
 
     fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
@@ -339,7 +338,7 @@ impl Renderer {
             &[Access::StorageWrite],
             &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
         );
-    Ok(())
+        Ok(())
     }
 
     /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). The ambient volume must be up to date.
@@ -366,16 +365,11 @@ impl Renderer {
         };
         self.raycast.record(rec, bindings, colour, depth, size)?;
         rec.end_stage()?;
-    Ok(())
+        Ok(())
     }
 
     /// Draws both eyes on the device's own queue and reads them back.
-    pub fn draw(
-        &self,
-        views: &[View; 2],
-        look: &Look,
-        size: [u32; 2],
-    ) -> Result<(StereoImage, Timings)> {
+    pub fn draw(&self, views: &[View; 2], look: &Look, size: [u32; 2]) -> Result<(StereoImage, Timings)> {
         if size.contains(&0) {
             return Err(Error::Config {
                 what: "image size".into(),
@@ -431,16 +425,18 @@ impl Renderer {
     }
 
     /// Recomputes the ambient volume in full, beside the current one, and compares the two bit by bit on every voxel that has
-    /// a value. The ambient volume must be up to date. Uses the device's queue and waits for it.
-    pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<Difference> {
+    /// a value. Also returns the time of the full recomputation. The ambient volume must be up to date. Uses the device's queue
+    /// and waits for it.
+    pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<(Difference, Timings)> {
         let expected = volume_image(&self.gpu, "expected ambient", &self.field, Format::R32Float)?;
         let mut rec = self.gpu.recorder("expected")?;
         rec.discard(&expected);
         rec.submit_and_wait()?;
         let v = &self.volumes;
         let settings = self.settings();
-        lao::run(&self.gpu, &self.field, &self.kernels, v, &settings, &v.opacity, &expected, progress)?;
-        Compare::new(&self.gpu)?.run(
+        let timings =
+            lao::run(&self.gpu, &self.field, &self.kernels, v, &settings, &v.opacity, &expected, progress)?;
+        let difference = Compare::new(&self.gpu)?.run(
             &self.gpu,
             &self.field,
             self.setup.scope,
@@ -448,7 +444,8 @@ impl Renderer {
             &v.mask,
             &expected,
             &v.ambient,
-        )
+        )?;
+        Ok((difference, timings))
     }
 
     /// What the left and the right eye read at world points in mm, in the order given. The ambient volume must be up to date.

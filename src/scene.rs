@@ -42,7 +42,7 @@
 //!     [image]
 //!     width = 1024                     # of one eye
 //!     height = 1024
-//!     step_mm = 0.5                    # between samples of a ray; default: half the smallest spacing
+//!     step_mm = 0.5                    # between samples of a ray; default: a quarter of the smallest spacing
 //!     background = "#17191d"
 //!
 //!     [shading]
@@ -283,7 +283,7 @@ pub struct ImageSettings {
     pub width: u32,
     /// Pixels down, 1 to [`MAX_IMAGE`].
     pub height: u32,
-    /// Distance of samples along a ray in mm; `None` is half the smallest spacing.
+    /// Distance of samples along a ray in mm; `None` is a quarter of the smallest spacing.
     pub step_mm: Option<f32>,
     /// Linear r, g, b behind the volume.
     pub background: [f32; 3],

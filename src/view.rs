@@ -77,7 +77,7 @@ impl View {
         self.projection() * self.view_matrix()
     }
 
-    /// Ray through image coordinates `uv` in [0,1]², origin at the top left: (eye position, direction whose
+    /// Ray through image coordinates `uv`, 0 … 1 each, origin at the top left: (eye position, direction whose
     /// component along the view axis is 1, so that its parameter is the depth in mm).
     pub fn ray(&self, uv: Vec2) -> (Vec3, Vec3) {
         let t = self.tan;
@@ -86,7 +86,7 @@ impl View {
         (self.position, self.orientation * Vec3::new(x, y, -1.0))
     }
 
-    /// Image coordinates in [0,1]² and Vulkan depth of a world point; `None` behind the eye.
+    /// Image coordinates, 0 … 1 each, and Vulkan depth of a world point; `None` behind the eye.
     pub fn project(&self, world: Vec3) -> Option<(Vec2, f32)> {
         let clip = self.view_projection() * world.extend(1.0);
         (clip.w > 0.0).then(|| (Vec2::new(clip.x / clip.w, clip.y / clip.w) * 0.5 + 0.5, clip.z / clip.w))
@@ -112,15 +112,25 @@ pub struct StereoRig {
 }
 
 impl StereoRig {
-    /// A rig that frames a volume of this size in mm from the given azimuth (about +z, from −y) and elevation in
-    /// degrees. The eyes' distance is 1/15 of the viewing distance, at most 63 mm, a comfortable parallax.
+    /// A rig from whose place a volume of this size in mm just fits into a square picture, seen from the given azimuth
+    /// (about +z, from −y) and elevation in degrees. The eyes' distance is 1/15 of the viewing distance, at most 63 mm, a
+    /// comfortable parallax.
     pub fn framing(size_mm: [f64; 3], azimuth_deg: f32, elevation_deg: f32) -> Self {
-        let radius = 0.5 * Vec3::from_array(size_mm.map(|s| s as f32)).length().max(1e-3);
         let fov_deg = 35.0_f32;
-        let distance = 0.92 * radius / (0.5 * fov_deg).to_radians().sin();
         let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
         let from = Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin());
         let up = if elevation_deg.abs() > 89.0 { Vec3::Y } else { Vec3::Z };
+        let right = up.cross(from).normalize();
+        let above = from.cross(right);
+        // Each corner of the volume asks for its distance; a twentieth is left free around them for the parallax.
+        let half = Vec3::from_array(size_mm.map(|s| 0.5 * s as f32));
+        let slope = (0.5 * fov_deg).to_radians().tan() / 1.05;
+        let fit = |corner: u32| {
+            let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let p = half * Vec3::new(sign(0), sign(1), sign(2));
+            p.dot(from) + p.dot(right).abs().max(p.dot(above).abs()) / slope
+        };
+        let distance = (0..8).map(fit).fold(1e-2, f32::max);
         Self {
             position: from * distance,
             target: Vec3::ZERO,
@@ -214,6 +224,22 @@ mod tests {
         assert!((l - r).length() < 1e-5 && (l - Vec2::splat(0.5)).length() < 1e-5);
         let (l, r) = at(rig.target + (rig.position - rig.target) * 0.3);
         assert!(l.x > r.x + 1e-3, "a near point lies further right in the left eye");
+    }
+
+    #[test]
+    fn framing_shows_all_corners_and_wastes_no_room() {
+        for (azimuth, elevation) in [(0.0, 0.0), (30.0, 25.0), (200.0, -70.0), (10.0, 90.0)] {
+            let size = [256.0, 200.0, 90.0];
+            let rig = StereoRig { ipd_mm: 0.0, ..StereoRig::framing(size, azimuth, elevation) };
+            let view = rig.views(1.0, 1.0, 1e5).unwrap()[0];
+            let mut widest = 0.0_f32;
+            for corner in 0..8 {
+                let sign = |bit: u32| if corner >> bit & 1 == 1 { 0.5 } else { -0.5 };
+                let p = Vec3::new(sign(0), sign(1), sign(2)) * Vec3::from_array(size.map(|s| s as f32));
+                widest = widest.max((view.project(p).unwrap().0 - 0.5).abs().max_element());
+            }
+            assert!((0.47..0.48).contains(&widest), "{azimuth} {elevation}: {widest}");
+        }
     }
 
     #[test]

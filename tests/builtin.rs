@@ -143,24 +143,24 @@ fn scenes_keep_their_proportions_at_other_sizes() {
 
 #[test]
 fn specs_name_size_box_and_spacing() {
-    assert_eq!(from_spec("engine:12").unwrap(), builtin("engine", 12).unwrap());
-    let made = from_spec("fruit:4x5x6:1,1,2.5").unwrap();
+    assert_eq!(from_spec("builtin:engine:12").unwrap(), builtin("engine", 12).unwrap());
+    let made = from_spec("builtin:fruit:4x5x6:1,1,2.5").unwrap();
     assert_eq!((made.dims, made.spacing), ([4, 5, 6], [1.0, 1.0, 2.5]));
-    assert_eq!(from_spec("voxel:3:2").unwrap().spacing, [2.0; 3]);
+    assert_eq!(from_spec("builtin:voxel:3:2").unwrap().spacing, [2.0; 3]);
 }
 
 #[test]
 fn impossible_specs_are_refused_by_name() {
     for (spec, expected) in [
-        ("engine", "expected NAME:SIZE"),
-        ("engine:", "expected NAME:SIZE"),
-        ("engine:12:1:1", "expected NAME:SIZE"),
-        ("engine:4x4", "expected NAME:SIZE"),
-        ("engine:-4", "expected NAME:SIZE"),
-        ("engine:0", "expected at least 1 along each axis"),
-        ("motor:8", "no volume \"motor\"; expected one of engine, fruit"),
-        ("engine:4:0,1,1", "spacing"),
-        ("engine:4:nan", "spacing"),
+        ("builtin:engine", "expected builtin:NAME:SIZE"),
+        ("builtin:engine:", "expected builtin:NAME:SIZE"),
+        ("builtin:engine:12:1:1", "expected builtin:NAME:SIZE"),
+        ("builtin:engine:4x4", "expected builtin:NAME:SIZE"),
+        ("builtin:engine:-4", "expected builtin:NAME:SIZE"),
+        ("builtin:engine:0", "with sizes of at least 1 voxel"),
+        ("builtin:motor:8", "no volume \"motor\"; expected one of engine, fruit"),
+        ("builtin:engine:4:0,1,1", "spacing"),
+        ("builtin:engine:4:nan", "spacing"),
     ] {
         let found = from_spec(spec).unwrap_err();
         assert!(
@@ -168,6 +168,6 @@ fn impossible_specs_are_refused_by_name() {
             "{spec}: {found}"
         );
     }
-    let found = from_spec("engine:99999999999").unwrap_err();
+    let found = from_spec("builtin:engine:99999999999").unwrap_err();
     assert!(matches!(found, Error::Limit { limit: 0x8000_0000, .. }), "{found}");
 }

@@ -132,6 +132,13 @@ fn sizes_beyond_the_device_are_refused_with_both_numbers() {
         }
         other => panic!("{:?}", other.err()),
     }
+    let most = gpu.info().max_buffer;
+    if most < u64::MAX {
+        let result = gpu.buffer("endless", most + 1, BufferUse::Device);
+        assert!(
+            matches!(result, Err(Error::Limit { needed, limit, .. }) if (needed, limit) == (most + 1, most))
+        );
+    }
     for (dims, layers, kind) in
         [([0, 1, 1], 1, ImageKind::D3), ([1; 3], 2, ImageKind::D3), ([1, 1, 2], 1, ImageKind::D2)]
     {
@@ -205,7 +212,8 @@ fn binding_by_name_refuses_all_that_does_not_fit_and_names_it() {
     rec.discard(&flat);
     rec.discard(&single);
     let (good_x, good_p, push) = (bind("numbers", &x), ("picture", Bind::Layer(&flat, 1)), [0u8; 8]);
-    let binds: &[(&[(&str, Bind<'_>)], &[&str])] = &[
+    type Case<'a> = (&'a [(&'a str, Bind<'a>)], &'a [&'a str]);
+    let binds: &[Case<'_>] = &[
         (&[good_x], &["`picture`", "missing", "test.main"]),
         (&[good_x, good_p, good_x], &["`numbers`", "twice"]),
         (&[good_x, good_p, bind("nubmers", &x)], &["`nubmers`", "numbers, picture"]),

@@ -31,7 +31,7 @@ fn a_volume_is_enough() {
     let scene = with("");
     let default = Scene::default_for(VolumeSource::parse("builtin:engine:16"));
     assert_eq!(format!("{scene:?}"), format!("{default:?}"));
-    assert_eq!(scene.transfer((0.0, 255.0)).unwrap(), scene.transfer((0.0, 255.0)).unwrap());
+    assert_eq!(scene.volume.open().unwrap().dims, [16; 3]);
     let occlusion = scene.occlusion.resolve(0.5).unwrap();
     assert_eq!(
         (occlusion.radius_mm, occlusion.rays, occlusion.quadrature),
@@ -133,7 +133,9 @@ fn files_are_found_beside_the_scene() {
             big_endian: true
         }
     );
-    assert_eq!(scene.transfer((0.0, 1.0)).unwrap().opacity_at(0.0), 0.25);
+    let volume = scene.volume.open().unwrap();
+    assert_eq!((volume.at(0, 0, 0), volume.at(1, 0, 0), volume.spacing), (1.0, 2.0, [1.0, 1.0, 2.0]));
+    assert_eq!(scene.transfer(volume.range()).unwrap().opacity_at(0.0), 0.25);
     for clip in &scene.clips {
         let Shape::Mesh(mesh) = &clip.shape else { panic!("a mesh") };
         assert!(mesh.signed_volume() > 3.0, "meshes face outward, whatever the file says");

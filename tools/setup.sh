@@ -13,22 +13,25 @@ have() { command -v "$1" >/dev/null 2>&1; }
 
 # --- packages ---------------------------------------------------------------------------------------------------------
 
-# What a need is called where: need, Debian and Ubuntu, Fedora, Arch.
-packages_of() { # need, column 2…4
-  awk -v need="$1" -v column="$2" '$1 == need { gsub(",", " ", $column); print $column }' <<'TABLE'
-linker        gcc,libc6-dev            gcc                       gcc
-certificates  ca-certificates          ca-certificates           ca-certificates
-loader        libvulkan1               vulkan-loader             vulkan-icd-loader
-driver        mesa-vulkan-drivers      mesa-vulkan-drivers       vulkan-swrast
-validation    vulkan-validationlayers  vulkan-validation-layers  vulkan-validation-layers
-spirv         spirv-tools              spirv-tools               spirv-tools
+# Each need: its packages on Debian and Ubuntu, on Fedora, on Arch, and what to call it. Spaces within are underscores.
+needs_table() {
+  cat <<'TABLE'
+linker        gcc_libc6-dev            gcc                       gcc                       linker_(cc)
+certificates  ca-certificates          ca-certificates           ca-certificates           CA_certificates
+loader        libvulkan1               vulkan-loader             vulkan-icd-loader         Vulkan_loader
+driver        mesa-vulkan-drivers      mesa-vulkan-drivers       vulkan-swrast             Vulkan_device_or_driver
+validation    vulkan-validationlayers  vulkan-validation-layers  vulkan-validation-layers  Vulkan_validation_layer
+spirv         spirv-tools              spirv-tools               spirv-tools               spirv-val
 TABLE
 }
 
-packages() { # column, needs…
-  local column=$1 need
-  shift
-  for need; do packages_of "$need" "$column"; done | paste -s -d ' '
+# Prints one column of the table for some needs, in one line.
+column() { # column, separator, needs…
+  local column=$1 separator=$2 need
+  shift 2
+  for need; do
+    needs_table | awk -v need="$need" -v column="$column" '$1 == need { gsub("_", " ", $column); print $column }'
+  done | paste -s -d "$separator" | sed 's/,/, /g'
 }
 
 # Runs a command as root, or fails: directly, or by a sudo that asks for nothing.
@@ -63,17 +66,19 @@ apt_refresh() {
 
 # Says in one line what is missing and how to get it; ends the script.
 stop_missing() { # needs…
+  local what
+  what="missing: $(column 5 , "$@")"
   if have apt-get; then
-    stop "missing: $*; as root run: apt-get update && apt-get install $(packages 2 "$@")"
+    stop "$what; to get it, as root: apt-get update && apt-get install $(column 2 ' ' "$@")"
   fi
-  stop "missing: $*; Fedora: dnf install $(packages 3 "$@"); Arch: pacman -S $(packages 4 "$@")"
+  stop "$what; to get it, Fedora: dnf install $(column 3 ' ' "$@"); Arch: pacman -S $(column 4 ' ' "$@")"
 }
 
 install() { # needs…
   if ! have apt-get || ! may_install; then stop_missing "$@"; fi
   apt_refresh
   local wanted
-  read -r -a wanted <<<"$(packages 2 "$@")"
+  read -r -a wanted <<<"$(column 2 ' ' "$@")"
   say "installing ${wanted[*]}"
   quietly apt install "${wanted[@]}" || stop_missing "$@"
 }
@@ -91,7 +96,7 @@ has_certificates() {
 has_loader() {
   local ldconfig=ldconfig directory
   have ldconfig || ldconfig=/sbin/ldconfig # not on a Debian user's PATH
-  "$ldconfig" -p 2>/dev/null | grep -q 'libvulkan\.so\.1' && return 0
+  "$ldconfig" -p 2>/dev/null | grep 'libvulkan\.so\.1' >/dev/null && return 0 # no -q: it would break the pipe
   while read -r -d : directory; do
     if [ -n "$directory" ] && [ -e "$directory/libvulkan.so.1" ]; then return 0; fi
   done <<<"${LD_LIBRARY_PATH:-}:"
@@ -141,25 +146,37 @@ setup() { # needs…
 quiet_cargo=()
 [ -t 2 ] || quiet_cargo=(--quiet)
 
-build() {
-  say "building (the first time takes some minutes)"
-  cargo build "${quiet_cargo[@]}" --release --locked --bin cao
+# Builds what the arguments name, in one go: built apart, dependencies whose features tests extend compile twice.
+build() { # cargo build's arguments
+  say "building (minutes the first time, seconds later)"
+  cargo build "${quiet_cargo[@]}" --release --locked "$@"
 }
 
-# Runs the program that build made.
-cao() { cargo run --quiet --release --locked --bin cao -- "$@"; }
+# Runs the program that build made, as it lies: `cargo run` would first build it again with other features.
+target_directory=
+cao() {
+  [ -n "$target_directory" ] ||
+    target_directory=$(cargo metadata --format-version 1 --no-deps --locked |
+      sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+  "$target_directory/release/cao" "$@"
+}
 
-# Sees to it that some Vulkan device answers; after build, because the program itself is asked.
+# Whether a device answers that lacks nothing.
+has_device() { cao devices --json 2>/dev/null | grep '"missing": *\[\]' >/dev/null; }
+
+# Sees to it that one does; after build, because the program itself is asked.
 setup_device() {
-  if cao devices >/dev/null 2>&1; then return 0; fi
+  if has_device; then return 0; fi
   if have apt-get && may_install; then
-    say "no Vulkan device answers; a software driver will do"
+    say "no usable Vulkan device answers; a software driver will do"
     install_software_driver
   else
     stop_missing driver
   fi
-  # Now let it speak: the reason is the user's only clue.
-  cao devices >/dev/null || stop "no Vulkan device answers, not even the software driver just installed"
+  if has_device; then return 0; fi
+  # Let the program speak: its reason is the user's only clue.
+  cao devices >&2 || true
+  stop "no usable Vulkan device answers, not even the software driver just installed"
 }
 
 # Mesa's software driver runs this program's kernels about three times faster from version 25 on, so an older
@@ -168,7 +185,9 @@ install_software_driver() {
   apt_refresh
   local candidate
   candidate=$(apt-cache policy mesa-vulkan-drivers | awk '$1 == "Candidate:" { print $2 }')
-  if dpkg --compare-versions "${candidate:-0}" lt 25 && install_driver_from_backports; then return 0; fi
+  case $candidate in
+  [0-9]*) if dpkg --compare-versions "$candidate" lt 25 && install_driver_from_backports; then return 0; fi ;;
+  esac
   install driver
 }
 
@@ -176,14 +195,12 @@ install_driver_from_backports() {
   local suite added=
   suite=$(. /etc/os-release && [ "${ID:-}" = debian ] && echo "${VERSION_CODENAME:-}-backports")
   [ -n "$suite" ] && [ "$suite" != -backports ] || return 1
-  if ! apt_knows "$suite"; then
-    added=$(add_backports "$suite") || return 1
+  if ! apt_knows "$suite"; then added=$(add_backports "$suite") || true; fi
+  if apt_knows "$suite"; then
+    say "installing mesa-vulkan-drivers from $suite"
+    if quietly apt install -t "$suite" mesa-vulkan-drivers; then return 0; fi
   fi
-  if apt_knows "$suite" && say "installing mesa-vulkan-drivers from $suite" &&
-    quietly apt install -t "$suite" mesa-vulkan-drivers; then
-    return 0
-  fi
-  say "$suite has no driver to install; taking the default one"
+  say "no driver to be had from $suite; taking the default one"
   [ -z "$added" ] || as_root rm -f "$added"
   return 1
 }
@@ -212,9 +229,9 @@ add_backports() { # suite
   esac
   say "adding $1 as $made"
   as_root tee "$made" <<<"$text" >/dev/null || return 1
-  # Only the new file is read: fast, and no other source can make this fail.
-  if quietly apt update -o Dir::Etc::SourceList="$made" -o Dir::Etc::SourceParts=/dev/null \
-    -o APT::Get::List-Cleanup=0 -o APT::Update::Error-Mode=any; then
+  # Only the new file is read: fast, and no other source can make this fail. A suite that does not exist is no news.
+  if apt update -o Dir::Etc::SourceList="$made" -o Dir::Etc::SourceParts=/dev/null \
+    -o APT::Get::List-Cleanup=0 -o APT::Update::Error-Mode=any >/dev/null 2>&1 </dev/null; then
     echo "$made"
   else
     as_root rm -f "$made"

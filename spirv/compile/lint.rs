@@ -1,4 +1,5 @@
-//! What naga lets pass and devices do not: workgroups that are too large, and barriers that some invocations never reach.
+//! What naga lets pass and devices do not: workgroups that are too large, and barriers that some invocations never reach. Not seen:
+//! invocations that leave a loop with a barrier in it at different times.
 
 use naga::{
     AddressSpace, Block, Function, Module, ShaderStage, Span, Statement,
@@ -108,8 +109,14 @@ impl<'a> Walk<'a> {
                     cases.iter().for_each(|case| self.block(&case.body, divergent));
                 }
                 Statement::Loop { body, continuing, .. } => {
+                    let returned = self.returned;
                     self.block(body, divergent);
                     self.block(continuing, divergent);
+                    if self.returned != returned {
+                        // A `return` inside comes before the barriers of the next round.
+                        self.block(body, divergent);
+                        self.block(continuing, divergent);
+                    }
                 }
                 _ => {}
             }

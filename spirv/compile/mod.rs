@@ -60,6 +60,15 @@ pub fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 /// Compiles one file; the error is a readable report that names file and line.
 pub fn file(path: &Path, options: Options) -> Result<Shader, String> {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    // The stem becomes the name of a Rust module.
+    if !stem.starts_with(|c: char| c.is_ascii_lowercase())
+        || !stem.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+    {
+        return Err(format!(
+            "error: {}: the name must be of a-z, 0-9 and _, beginning with a letter",
+            path.display()
+        ));
+    }
     source(&stem, &Source::read(path)?, options)
 }
 

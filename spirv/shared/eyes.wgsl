@@ -33,7 +33,8 @@ struct Frame {
     occluded: f32,
     // 1: samples start at a different fraction of a step in every pixel
     jitter: f32,
-    pad: f32,
+    // the ambient factor is shown times this
+    gain: f32,
 }
 
 fn index_of(world: vec3<f32>) -> vec3<f32> {

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
-//! C  += (1 − A) α_k · TF_c(V(p_k)) · V_AO(p_k) · (ambient + diffuse |n·l|)
+//! C  += (1 − A) α_k · TF_c(V(p_k)) · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
 //! A  += (1 − A) α_k                                                         until A ≥ 0.99
 //! ```
 //!
@@ -19,6 +19,8 @@ use glam::{DVec3, Vec2, Vec3};
 
 /// A ray ends when this much is covered.
 pub const OPAQUE: f64 = 0.99;
+/// The ambient factor is shown times this: a flat wall's is ½.
+pub const GAIN: f64 = 2.0;
 /// Below this gradient of opacity per mm there is no surface, and the diffuse term is 1.
 pub const FLAT_PER_MM: f64 = 1e-4;
 
@@ -75,17 +77,26 @@ fn pixel(frame: &Frame, view: &View, size: [usize; 2], [x, y]: [usize; 2]) -> ([
 
     let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
     let samples = (0..).map(|k| begin + (f64::from(k) + phase) * frame.step_mm);
+    let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
+    let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
+    let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
+    let mut hidden_at = f64::NEG_INFINITY;
     for t in samples.take_while(|&t| t < end) {
-        let world = origin + t * direction;
-        let position = frame.grid.to_index(world.to_array());
-        let value = trilinear_clamped(&frame.grid, frame.values, position) as f32;
-        let opacity = f64::from(frame.transfer.opacity_at(value));
-        if opacity == 0.0 || !visible(frame.clips, world.as_vec3()) {
+        if frame.transfer.opacity_at(value_at(t)) == 0.0 {
             continue;
         }
+        if !shown_at(t) {
+            hidden_at = t;
+            continue;
+        }
+        let follows_hidden = t - hidden_at < 1.5 * frame.step_mm;
+        let t = if follows_hidden { cut(hidden_at, t, shown_at) } else { t };
+        let position = at(t);
+        let value = value_at(t);
+        let opacity = f64::from(frame.transfer.opacity_at(value));
         let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
         let shade = if frame.shading.occlusion {
-            trilinear_clamped(&frame.grid, frame.ambient, position)
+            GAIN * trilinear_clamped(&frame.grid, frame.ambient, position)
         } else {
             1.0
         };
@@ -102,6 +113,20 @@ fn pixel(frame: &Frame, view: &View, size: [usize; 2], [x, y]: [usize; 2]) -> ([
         }
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
+}
+
+/// Where a ray comes out of a clip, between a hidden and a visible sample, to 1/16 of their distance: a cut face is
+/// shaded at one depth.
+fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..4 {
+        let middle = (hidden + shown) / 2.0;
+        if shown_at(middle) {
+            shown = middle;
+        } else {
+            hidden = middle;
+        }
+    }
+    shown
 }
 
 /// Distances in mm at which a ray enters and leaves the volume, the box of index coordinates −½ … dims − ½; the first

@@ -40,13 +40,21 @@ impl Gpu {
     /// A buffer of `bytes` bytes, content undefined.
     ///
     /// # Errors
-    /// [`Error::Config`] for 0 bytes, [`Error::Memory`] or [`Error::Vulkan`] if the device refuses.
+    /// [`Error::Config`] for 0 bytes, [`Error::Limit`] beyond the device's largest, [`Error::Memory`] or [`Error::Vulkan`] if the device refuses.
     pub fn buffer(&self, name: &str, bytes: u64, kind: BufferUse) -> Result<Buffer> {
         use vk::BufferUsageFlags as U;
         if bytes == 0 {
             return Err(Error::Config {
                 what: format!("buffer {name}"),
                 problem: "has 0 bytes, needs at least 1".into(),
+            });
+        }
+        if bytes > self.0.info.max_buffer {
+            return Err(Error::Limit {
+                what: format!("buffer {name}: bytes"),
+                needed: bytes,
+                limit: self.0.info.max_buffer,
+                hint: "work on smaller bricks".into(),
             });
         }
         let (usage, location) = match kind {

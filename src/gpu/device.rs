@@ -65,13 +65,13 @@ pub(crate) struct Inner {
     next_id: AtomicU64,
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
+    /// The loaded library, which all function pointers point into.
+    _entry: ash::Entry,
 }
 
-/// Held until the device is gone.
+/// Marks device and instance as ours.
 struct Owned {
     messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    /// The loaded library, which the function pointers point into.
-    _entry: ash::Entry,
 }
 
 /// Turns a Vulkan result into our error.
@@ -188,16 +188,21 @@ impl Gpu {
         let Instance { entry, instance, debug } = instance;
         let messenger = validation.then(|| {
             let messages = ash::ext::debug_utils::Instance::new(&entry, &instance);
-            // SAFETY: the log is held by `Inner`, which destroys the messenger. Without a messenger validation would be mute, so a
-            // failure (out of host memory only) is kept as a message.
+            // SAFETY: the log is held by `Inner`, which destroys the messenger.
             let messenger = unsafe { messages.create_debug_utils_messenger(&log.messenger(), None) };
-            (messages, messenger.unwrap_or_default())
+            // Without it validation would be mute and seem content.
+            (
+                messages,
+                messenger
+                    .inspect_err(|e| log.keep("vkCreateDebugUtilsMessengerEXT", &e.to_string()))
+                    .unwrap_or_default(),
+            )
         });
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family, 0) };
-        let parts = Parts { instance, physical, info, device, family, queue: Some(queue), debug, log };
+        let parts = Parts { entry, instance, physical, info, device, family, queue: Some(queue), debug, log };
         // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
-        parts.build(Some(Owned { messenger, _entry: entry }))
+        parts.build(Some(Owned { messenger }))
     }
 
     fn create_device(
@@ -240,6 +245,7 @@ impl Gpu {
         let info = DeviceInfo::of(&host.instance, host.physical_device);
         choose(std::slice::from_ref(&info), None)?;
         let parts = Parts {
+            entry: host.entry,
             instance: host.instance,
             physical: host.physical_device,
             info,
@@ -298,6 +304,7 @@ impl Gpu {
 
 /// What [`Inner`] is put together from.
 struct Parts {
+    entry: ash::Entry,
     instance: ash::Instance,
     physical: vk::PhysicalDevice,
     info: DeviceInfo,
@@ -310,7 +317,7 @@ struct Parts {
 
 impl Parts {
     fn build(self, owned: Option<Owned>) -> Result<Gpu> {
-        let Self { instance, physical, info, device, family, queue, debug, log } = self;
+        let Self { entry, instance, physical, info, device, family, queue, debug, log } = self;
         // SAFETY: `physical` was enumerated from this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits);
@@ -337,6 +344,7 @@ impl Parts {
             hazards: Mutex::default(),
             next_id: AtomicU64::new(1),
             owned,
+            _entry: entry,
             device,
             instance,
         })))

@@ -23,6 +23,8 @@ pub struct DeviceInfo {
     pub max_image_3d: u32,
     /// Most layers of an image.
     pub max_image_layers: u32,
+    /// Largest buffer, bytes.
+    pub max_buffer: u64,
     /// Largest part of a buffer that one storage binding can show, bytes.
     pub max_storage_range: u64,
     /// Largest part of a buffer that one uniform binding can show, bytes.
@@ -64,9 +66,13 @@ impl DeviceInfo {
     pub(crate) fn of(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
-        let mut chain = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut v11);
-        // SAFETY: `device` was enumerated from `instance`; the chained structs outlive the call. Devices of Vulkan 1.0, which do
-        // not know them, leave them zero.
+        let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+        let mut chain = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut driver)
+            .push_next(&mut v11)
+            .push_next(&mut v13);
+        // SAFETY: `device` was enumerated from `instance`; the chained structs outlive the call. Devices of older
+        // versions, which do not know some, leave those zero.
         unsafe { instance.get_physical_device_properties2(device, &mut chain) };
         let properties = chain.properties;
         // SAFETY: as above.
@@ -100,6 +106,7 @@ impl DeviceInfo {
             max_image_2d: limits.max_image_dimension2_d,
             max_image_3d: limits.max_image_dimension3_d,
             max_image_layers: limits.max_image_array_layers,
+            max_buffer: v13.max_buffer_size,
             max_storage_range: limits.max_storage_buffer_range.into(),
             max_uniform_range: limits.max_uniform_buffer_range.into(),
             max_workgroups: limits.max_compute_work_group_count,
@@ -172,6 +179,7 @@ mod tests {
             max_image_2d: 0,
             max_image_3d: 0,
             max_image_layers: 0,
+            max_buffer: 0,
             max_storage_range: 0,
             max_uniform_range: 0,
             max_workgroups: [0; 3],

@@ -248,6 +248,9 @@ fn entry_point(shader: &'static Shader, name: &str, stage: Stage) -> Result<&'st
     })
 }
 
+/// Most views of one pass, which every device of Vulkan 1.3 has.
+const MAX_VIEWS: u32 = 6;
+
 fn check_graphics(name: &str, desc: &GraphicsDesc<'_>) -> Result<()> {
     let problem = if desc.depth.is_none() && (desc.depth_write || desc.depth_test != DepthTest::Always) {
         "tests or writes depth but has no depth attachment"
@@ -257,6 +260,8 @@ fn check_graphics(name: &str, desc: &GraphicsDesc<'_>) -> Result<()> {
         "has a colour format as its depth attachment"
     } else if desc.colours.len() > COLOURS.len() {
         "has more than 4 colour attachments"
+    } else if desc.view_mask >> MAX_VIEWS != 0 {
+        "has more than 6 views"
     } else {
         return Ok(());
     };

@@ -254,21 +254,22 @@ impl Recorder {
         let device = &self.gpu.device;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.cmd)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
-        // SAFETY: the command buffer is ours and recording; queue access is locked; the fence is destroyed after the wait, or after a
-        // failure of it, which means that the device is lost and nothing runs any more.
+        // SAFETY: the command buffer is ours and recording; queue access is locked; the fence is destroyed after the wait.
         unsafe {
             device.end_command_buffer(self.cmd).map_err(vulkan("vkEndCommandBuffer", &self.name))?;
             let fence = device.create_fence(&vk::FenceCreateInfo::default(), None);
             let fence = fence.map_err(vulkan("vkCreateFence", &self.name))?;
-            let submitted = {
-                let queue = queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                device.queue_submit2(*queue, &submit, fence).map_err(vulkan("vkQueueSubmit2", &self.name))
-            };
-            let waited = submitted.and_then(|()| {
+            let locked = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let submitted = device.queue_submit2(*locked(), &submit, fence);
+            let waited = submitted.map_err(vulkan("vkQueueSubmit2", &self.name)).and_then(|()| {
                 device
                     .wait_for_fences(&[fence], true, u64::MAX)
                     .map_err(vulkan("vkWaitForFences", &self.name))
             });
+            if waited.is_err() {
+                // Nothing may be freed while it is in use; an idle or lost queue uses nothing.
+                let _ = device.queue_wait_idle(*locked());
+            }
             device.destroy_fence(fence, None);
             waited?;
         }

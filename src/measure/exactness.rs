@@ -4,6 +4,7 @@
 use super::random::Random;
 use crate::Result;
 use crate::clip::{Clip, Mode, Pose, Shape};
+use crate::gpu::Timings;
 use crate::renderer::{Categories, Renderer};
 use crate::stage::compare::Difference;
 use crate::stage::eyes::Look;
@@ -30,6 +31,10 @@ pub struct Trial {
     pub difference: Difference,
     /// Voxels of each category.
     pub categories: Categories,
+    /// Stages of the contextual update, classification included, ms.
+    pub contextual: Timings,
+    /// Stages of the full recomputation of the same volume, ms.
+    pub full: Timings,
 }
 
 /// Left eye against right.
@@ -63,6 +68,14 @@ impl Report {
         })
     }
 
+    /// Median over the trials of full time / contextual time.
+    pub fn speedup(&self) -> f64 {
+        let mut ratios: Vec<f64> =
+            self.trials.iter().map(|t| sum(&t.full) / sum(&t.contextual).max(1e-6)).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
+    }
+
     /// Whether nothing differs, in any voxel or between the eyes.
     pub fn exact(&self) -> bool {
         self.total().different == 0 && self.stereo.different == 0
@@ -86,9 +99,18 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
             let clip = random_clip(&mut random, renderer, shape, pose);
             renderer.set_clips(std::slice::from_ref(&clip))?;
             let done = f64::from(report.trials.len() as u32);
-            renderer.update(&mut |_| ())?;
-            let difference = renderer.verify(&mut |part| progress((done + part) / f64::from(total)))?;
-            report.trials.push(Trial { clip, difference, categories: renderer.categories()? });
+            let contextual = renderer.update(&mut |_| ())?;
+            let (difference, full) =
+                renderer.verify(&mut |part| progress((done + part) / f64::from(total)))?;
+            // The first update also computes V_PAO, which belongs to neither.
+            let contextual = contextual.into_iter().filter(|(stage, _)| !stage.starts_with("precompute"));
+            report.trials.push(Trial {
+                clip,
+                difference,
+                categories: renderer.categories()?,
+                contextual: contextual.collect(),
+                full,
+            });
         }
         let seen = compare_eyes(renderer, &mut random)?;
         report.stereo.points += seen.points;
@@ -96,6 +118,10 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
         report.stereo.largest = report.stereo.largest.max(seen.largest);
     }
     Ok(report)
+}
+
+fn sum(timings: &Timings) -> f64 {
+    timings.iter().map(|(_, ms)| ms).sum()
 }
 
 /// A random pose of a shape: in turn ordinary, across the border, tiny, covering everything, outside; either side hidden.

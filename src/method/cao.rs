@@ -48,9 +48,6 @@ pub fn record(
         bindings,
     )?;
     rec.end_stage()?;
-    rec.barrier(
-        &[Access::StorageWrite],
-        &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
-    );
+    rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead]);
     Ok(())
 }

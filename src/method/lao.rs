@@ -32,10 +32,7 @@ pub fn record(
         b,
     )?;
     rec.end_stage()?;
-    rec.barrier(
-        &[Access::StorageWrite],
-        &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
-    );
+    rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead]);
     Ok(())
 }
 
@@ -132,5 +129,11 @@ fn list(
 
 fn bindings<'a>(volumes: &'a Volumes, opacity: &'a Image, ambient: &'a Image) -> Bindings<'a> {
     // The mask and a precomputed volume are bound but not read by a full computation; V_PAO may be its output.
-    Bindings { opacity, list: &volumes.list, mask: &volumes.mask, precomputed: &volumes.full_opacity, ambient }
+    Bindings {
+        opacity,
+        list: &volumes.list,
+        mask: &volumes.mask,
+        precomputed: &volumes.full_opacity,
+        ambient,
+    }
 }

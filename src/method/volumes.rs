@@ -43,13 +43,9 @@ impl Volumes {
             list: BrickList::new(gpu, field)?,
         };
         let mut rec = gpu.recorder("clear volumes")?;
-        for image in [
-            &volumes.full_opacity,
-            &volumes.opacity,
-            &volumes.mask,
-            &volumes.precomputed,
-            &volumes.ambient,
-        ] {
+        for image in
+            [&volumes.full_opacity, &volumes.opacity, &volumes.mask, &volumes.precomputed, &volumes.ambient]
+        {
             rec.discard(image);
         }
         rec.barrier(&[], &[Access::TransferWrite]);

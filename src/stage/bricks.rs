@@ -6,9 +6,9 @@
 
 use super::field::Field;
 use super::row_of_groups;
-use crate::gpu::{shaders, Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]
@@ -89,6 +89,6 @@ impl Bricks {
             &[Access::StorageWrite],
             &[Access::IndirectRead, Access::StorageRead, Access::StorageWrite, Access::TransferRead],
         );
-    Ok(())
+        Ok(())
     }
 }

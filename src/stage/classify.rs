@@ -6,12 +6,12 @@
 //! for voxels within reach of a clip.
 
 use super::clips::ClipSet;
-use super::field::Field;
 use super::device_buffer;
-use crate::gpu::{shaders, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
+use super::field::Field;
+use crate::Result;
+use crate::gpu::{Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, shaders};
 use crate::layout_check;
 use crate::occlusion::Occlusion;
-use crate::Result;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]
@@ -97,11 +97,13 @@ impl Classify {
     }
 }
 
-/// The N extra positions in the voxel's [−1, 1]³: the R3 sequence (Roberts 2018), whose every prefix is evenly spread.
+/// The N extra positions in the voxel's [−1, 1]³: points of the R3 sequence (Roberts 2018), whose every prefix is evenly
+/// spread, each followed by its mirror image, so that the mean of every even number of them is the centre.
 fn sample_positions() -> [[f32; 4]; 32] {
     const G: f64 = 1.220_744_084_605_759_5;
     std::array::from_fn(|k| {
-        let u = |power: i32| (0.5 + (k + 1) as f64 * G.powi(-power)).fract();
-        [1, 2, 3, 0].map(|axis| if axis == 0 { 0.0 } else { (2.0 * u(axis) - 1.0) as f32 })
+        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let u = |power: i32| (0.5 + (k / 2 + 1) as f64 / G.powi(power)).fract();
+        [1, 2, 3, 0].map(|axis| if axis == 0 { 0.0 } else { (side * (2.0 * u(axis) - 1.0)) as f32 })
     })
 }

@@ -7,7 +7,7 @@
 use super::dilate::Dilate;
 use super::peel::{Layers, MAX_PAIRS, Peel};
 use crate::clip::{Clip, ClipCamera, Mode, Shape};
-use crate::gpu::{shaders, Access, Buffer, BufferUse, Gpu, Recorder};
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings, shaders};
 use crate::layout_check;
 use crate::mesh::TriangleMesh;
 use crate::{Error, Result};
@@ -71,9 +71,19 @@ impl MapSettings {
         if !(8..=4096).contains(&self.resolution) {
             return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
         }
-        if self.cells == 0 || self.resolution % self.cells != 0 || (self.literal && self.cells != self.resolution) {
-            let wanted = if self.literal { "the depth map's resolution" } else { "a divisor of the depth map's resolution" };
-            return refuse("dilation map resolution", format!("{}; expected {wanted}, {}", self.cells, self.resolution));
+        if self.cells == 0
+            || self.resolution % self.cells != 0
+            || (self.literal && self.cells != self.resolution)
+        {
+            let wanted = if self.literal {
+                "the depth map's resolution"
+            } else {
+                "a divisor of the depth map's resolution"
+            };
+            return refuse(
+                "dilation map resolution",
+                format!("{}; expected {wanted}, {}", self.cells, self.resolution),
+            );
         }
         if !(1..=MAX_PAIRS).contains(&self.pairs) {
             return refuse("layer pairs", format!("{}; expected 1 … {MAX_PAIRS}", self.pairs));
@@ -139,7 +149,7 @@ impl ClipSet {
 
     /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only
     /// translations and rotations changed. `radius` in mm is the reach of a change: ray length, footprint and sample cell.
-    /// Uses the device's queue and waits for it when there is something to draw.
+    /// Uses the device's queue and waits for it when there is something to draw; returns the times of the stages.
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
@@ -148,7 +158,7 @@ impl ClipSet {
         clips: &[Clip],
         radius: f32,
         settings: MapSettings,
-    ) -> Result<()> {
+    ) -> Result<Timings> {
         check(clips)?;
         settings.check()?;
         let mut wanted = Vec::new();
@@ -168,9 +178,10 @@ impl ClipSet {
             && self.peeled.len() == wanted.len()
             && self.peeled.iter().zip(&wanted).all(|(have, want)| same_layers(have, want));
         if unchanged {
-            return Ok(());
+            return Ok(Timings::new());
         }
 
+        let mut timings = Timings::new();
         let mut peeled = Vec::new();
         for want in &wanted {
             let (mesh, scale, _) = *want;
@@ -181,6 +192,7 @@ impl ClipSet {
                     mesh.closed()?;
                     let camera = ClipCamera::around(mesh, scale, radius, settings.resolution);
                     let layers = peel.run(gpu, mesh, scale, camera, settings.pairs)?;
+                    timings.push(("peel".into(), layers.milliseconds));
                     Peeled { mesh: mesh.clone(), scale, margin: radius, settings, layers }
                 }
             });
@@ -204,7 +216,7 @@ impl ClipSet {
             dilation_at += 2 * pairs * settings.cells * settings.cells;
         }
         if self.meshes.is_empty() {
-            return Ok(());
+            return Ok(timings);
         }
         let all: Vec<f32> = self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
         self.layers = super::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
@@ -213,11 +225,16 @@ impl ClipSet {
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
         let mut rec = gpu.recorder("dilate")?;
         for mesh in &self.meshes {
-            rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+            rec.barrier(
+                &[Access::StorageRead, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
+            rec.stage("dilate")?;
             dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
+            rec.end_stage()?;
         }
-        rec.submit_and_wait()?;
-        Ok(())
+        timings.extend(rec.submit_and_wait()?);
+        Ok(timings)
     }
 
     /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
@@ -258,7 +275,7 @@ impl ClipSet {
         rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
-    Ok(())
+        Ok(())
     }
 }
 

@@ -4,9 +4,9 @@
 
 use super::field::Field;
 use super::lao::Scope;
-use crate::gpu::{shaders, Access, Bind, BufferUse, Gpu, Image, Pipeline};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]

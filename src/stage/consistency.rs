@@ -5,9 +5,9 @@
 
 use super::device_buffer;
 use super::eyes::FrameBuffer;
-use crate::gpu::{shaders, Access, Bind, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 

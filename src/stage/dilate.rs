@@ -6,9 +6,9 @@
 //! literal recipe (D = Z, distances between centres) is kept to show that it is not. Cost: (2·radius/cell)² reads a cell.
 
 use super::clips::MeshClip;
-use crate::gpu::{shaders, Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]

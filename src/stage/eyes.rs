@@ -1,7 +1,7 @@
 //! Eyes and frame settings on the device (`spirv/shared/eyes.wgsl`).
 
 use super::field::Field;
-use crate::gpu::{shaders, Access, Buffer, BufferUse, Gpu, Recorder};
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
 use crate::layout_check;
 use crate::view::View;
 use crate::{Error, Result};
@@ -34,10 +34,10 @@ struct Frame {
     scale: f32,
     occluded: f32,
     jitter: f32,
-    pad: f32,
+    gain: f32,
 }
 layout_check!(Frame => shaders::raycast::FRAME {
-    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, pad
+    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, gain
 });
 
 /// How samples are lit and where they lie.
@@ -49,10 +49,14 @@ pub struct Look {
     pub diffuse: f32,
     /// Direction towards the light in the world; the same for both eyes.
     pub light: Vec3,
-    /// Distance between samples along a ray in mm; `None` is half the smallest spacing.
+    /// Distance between samples along a ray in mm; `None` is a quarter of the smallest spacing: at half of it,
+    /// steep transfer functions show wood-grain.
     pub step_mm: Option<f32>,
     /// Opacity at which a ray ends.
     pub opaque: f32,
+    /// The ambient factor is shown times this. A flat wall's is 1/2, so that 2 shows it at full light; the paper's authors do
+    /// the same.
+    pub gain: f32,
     /// Whether samples start at another fraction of a step in every pixel, against banding.
     pub jitter: bool,
     /// Whether the ambient factor is shown; without it the picture is the paper's "solid colour".
@@ -67,6 +71,7 @@ impl Default for Look {
             light: Vec3::new(-0.4, -0.7, 0.6),
             step_mm: None,
             opaque: 0.99,
+            gain: 2.0,
             jitter: true,
             occluded: true,
         }
@@ -76,7 +81,11 @@ impl Default for Look {
 impl Look {
     fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
-        for (what, value) in [("shading.ambient", self.ambient), ("shading.diffuse", self.diffuse)] {
+        for (what, value) in [
+            ("shading.ambient", self.ambient),
+            ("shading.diffuse", self.diffuse),
+            ("shading.gain", self.gain),
+        ] {
             if !(value.is_finite() && value >= 0.0) {
                 return refuse(what, format!("{value}; expected a number >= 0"));
             }
@@ -132,7 +141,7 @@ impl FrameBuffer {
                 view_projection: view.view_projection().to_cols_array_2d(),
             };
         }
-        let step = look.step_mm.unwrap_or(0.5 * field.min_spacing());
+        let step = look.step_mm.unwrap_or(0.25 * field.min_spacing());
         data.dims = [field.dims[0] as f32, field.dims[1] as f32, field.dims[2] as f32, 0.0];
         data.spacing = [field.spacing[0], field.spacing[1], field.spacing[2], step];
         data.light = look.light.normalize().extend(reference_mm).to_array();
@@ -142,10 +151,11 @@ impl FrameBuffer {
         data.bias = field.bias;
         data.scale = field.scale;
         data.occluded = f32::from(u8::from(look.occluded));
+        data.gain = look.gain;
         data.jitter = f32::from(u8::from(look.jitter));
         rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);
-    Ok(())
+        Ok(())
     }
 }

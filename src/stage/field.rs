@@ -4,9 +4,9 @@
 //! stored value exactly; the file's slope and intercept go into `scale` and `bias`. 32- and 64-bit values are rounded to
 //! f32, the one loss there is.
 
+use crate::Result;
 use crate::gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use crate::volume::{Values, Volume};
-use crate::Result;
 
 /// Edge of a brick in voxels, as the kernels have it.
 pub const BRICK: u32 = 8;

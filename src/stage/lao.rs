@@ -9,10 +9,12 @@
 
 use super::bricks::BrickList;
 use super::field::Field;
-use crate::gpu::{shaders, Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use crate::Result;
+use crate::gpu::{
+    Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc, shaders,
+};
 use crate::layout_check;
 use crate::occlusion::Occlusion;
-use crate::Result;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]
@@ -101,7 +103,7 @@ impl Lao {
         rec.barrier(&[Access::UniformRead], &[Access::TransferWrite]);
         rec.update(&self.rays, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead]);
-    Ok(())
+        Ok(())
     }
 
     /// Works on the whole list by one indirect dispatch.

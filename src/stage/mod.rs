@@ -16,8 +16,8 @@ pub mod peel;
 pub mod raycast;
 pub mod transfer;
 
-use crate::gpu::{Access, Buffer, BufferUse, Gpu};
 use crate::Result;
+use crate::gpu::{Access, Buffer, BufferUse, Gpu};
 
 /// Device memory with this content. Uses the device's queue and waits for it.
 fn device_buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Result<Buffer> {

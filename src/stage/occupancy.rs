@@ -6,9 +6,9 @@
 use super::field::Field;
 use super::row_of_groups;
 use super::transfer::TransferBuffer;
-use crate::gpu::{shaders, Bind, Buffer, Gpu, Pipeline, Recorder};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Bind, Buffer, Gpu, Pipeline, Recorder, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]

@@ -4,9 +4,9 @@
 
 use super::field::Field;
 use super::transfer::TransferBuffer;
-use crate::gpu::{shaders, Bind, Gpu, Image, Pipeline, Recorder};
-use crate::layout_check;
 use crate::Result;
+use crate::gpu::{Bind, Gpu, Image, Pipeline, Recorder, shaders};
+use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]

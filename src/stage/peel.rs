@@ -7,8 +7,8 @@
 
 use crate::clip::ClipCamera;
 use crate::gpu::{
-    shaders, Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc, ImageKind,
-    ImageUse, Pipeline,
+    Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc,
+    ImageKind, ImageUse, Pipeline, shaders,
 };
 use crate::layout_check;
 use crate::mesh::TriangleMesh;
@@ -39,6 +39,8 @@ pub struct Layers {
     pub pairs: u32,
     /// `pairs` × (front, back) × resolution² depths, rows of y, x fastest; empty pixels 1.
     pub depth: Vec<f32>,
+    /// Time that drawing them took on the device.
+    pub milliseconds: f64,
 }
 
 /// The kernel `peel`.
@@ -95,6 +97,7 @@ impl Peel {
         let edge = camera.resolution;
         let map_bytes = u64::from(edge) * u64::from(edge) * 4;
         let read_back = gpu.buffer("layer read-back", map_bytes, BufferUse::Readback)?;
+        let mut milliseconds = 0.0;
         let mut maps: [Vec<Vec<f32>>; 2] = [Vec::new(), Vec::new()];
         for (pipeline, maps) in [&self.front, &self.back].into_iter().zip(&mut maps) {
             let mut before = depth_image(gpu, edge)?;
@@ -114,17 +117,24 @@ impl Peel {
                 }
                 rec.discard(&now);
                 rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead]);
+                rec.stage("peel")?;
                 rec.draw(
                     pipeline,
                     &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
                     bytemuck::bytes_of(&params),
-                    Attachments { colours: &[], depth: Some((&now, Some(1.0))), layer: None, size: [edge, edge] },
+                    Attachments {
+                        colours: &[],
+                        depth: Some((&now, Some(1.0))),
+                        layer: None,
+                        size: [edge, edge],
+                    },
                     corners.len() as u32,
                 )?;
+                rec.end_stage()?;
                 rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
                 rec.copy_image_to_buffer(&now, 0, [0; 3], [edge, edge, 1], &read_back, 0)?;
                 rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-                rec.submit_and_wait()?;
+                milliseconds += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
                 let map: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
                 if map.iter().all(|&z| z >= 1.0) {
                     break;
@@ -137,8 +147,12 @@ impl Peel {
 
         let empty = vec![1.0; (edge * edge) as usize];
         let layer = |side: usize, pair: usize| maps[side].get(pair).unwrap_or(&empty);
-        let depth = (0..pairs as usize).flat_map(|pair| [layer(0, pair), layer(1, pair)]).flatten().copied().collect();
-        Ok(Layers { camera, pairs, depth })
+        let depth = (0..pairs as usize)
+            .flat_map(|pair| [layer(0, pair), layer(1, pair)])
+            .flatten()
+            .copied()
+            .collect();
+        Ok(Layers { camera, pairs, depth, milliseconds })
     }
 }
 
@@ -156,7 +170,12 @@ fn depth_image(gpu: &Gpu, edge: u32) -> Result<Image> {
 }
 
 /// Number of pairs, or what is wrong and where.
-fn check(mesh: &TriangleMesh, [fronts, backs]: &[Vec<Vec<f32>>; 2], edge: u32, max_pairs: u32) -> Result<u32> {
+fn check(
+    mesh: &TriangleMesh,
+    [fronts, backs]: &[Vec<Vec<f32>>; 2],
+    edge: u32,
+    max_pairs: u32,
+) -> Result<u32> {
     let refuse = |problem| Err(Error::Mesh { name: mesh.name.clone(), problem });
     let found = fronts.len().max(backs.len());
     if found > max_pairs as usize {
@@ -174,9 +193,8 @@ fn check(mesh: &TriangleMesh, [fronts, backs]: &[Vec<Vec<f32>>; 2], edge: u32, m
         return refuse("no face is seen by the clip camera; expected a closed mesh with a volume".into());
     }
     let at = |maps: &[Vec<f32>], layer: usize, pixel: usize| maps.get(layer).map_or(1.0, |map| map[pixel]);
-    let mut odd = (0..(edge * edge) as usize).filter(|&pixel| {
-        (0..found).any(|k| (at(fronts, k, pixel) < 1.0) != (at(backs, k, pixel) < 1.0))
-    });
+    let mut odd = (0..(edge * edge) as usize)
+        .filter(|&pixel| (0..found).any(|k| (at(fronts, k, pixel) < 1.0) != (at(backs, k, pixel) < 1.0)));
     if let Some(first) = odd.next() {
         return refuse(format!(
             "front and back layers differ in number at {} of {} pixels of the clip camera, first at ({}, {}): the mesh is open or \

@@ -8,12 +8,12 @@ use super::clips::ClipSet;
 use super::eyes::FrameBuffer;
 use super::field::Field;
 use super::transfer::TransferBuffer;
+use crate::Result;
 use crate::gpu::{
-    shaders, Attachments, Bind, Buffer, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder, Sampler,
-    SamplerDesc,
+    Attachments, Bind, Buffer, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder,
+    Sampler, SamplerDesc, shaders,
 };
 use crate::layout_check;
-use crate::Result;
 use bytemuck::{Pod, Zeroable};
 
 #[repr(C)]
@@ -101,6 +101,6 @@ impl Raycast {
             layer: None,
             size,
         };
-        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 3)
+        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 6)
     }
 }

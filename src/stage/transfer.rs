@@ -1,9 +1,9 @@
 //! The transfer function on the device (`spirv/shared/transfer.wgsl`): its control points, 2 KiB.
 
-use crate::gpu::{shaders, Access, Buffer, BufferUse, Gpu, Recorder};
+use crate::Result;
+use crate::gpu::{Access, Buffer, BufferUse, Gpu, Recorder, shaders};
 use crate::layout_check;
 use crate::transfer::TransferFunction;
-use crate::Result;
 use bytemuck::{Pod, Zeroable};
 
 const POINTS: usize = 64;
@@ -48,6 +48,6 @@ impl TransferBuffer {
         rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
-    Ok(())
+        Ok(())
     }
 }

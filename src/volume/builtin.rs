@@ -80,16 +80,20 @@ pub fn builtin_box(name: &str, dims: [usize; 3], spacing: [f64; 3]) -> Result<Vo
     Volume::new(dims, spacing, values)
 }
 
-/// The built-in volume that `spec` describes: `NAME:SIZE`, `NAME:XxYxZ` or `NAME:XxYxZ:SX,SY,SZ` (after the
-/// `builtin:` of a volume's name).
+/// The built-in volume that `spec` names: `builtin:NAME:SIZE`, `builtin:NAME:XxYxZ` or `builtin:NAME:XxYxZ:SX,SY,SZ`.
 ///
 /// # Errors
 /// [`Error::Config`] when `spec` has another form, else as [`builtin_box`].
 pub fn from_spec(spec: &str) -> Result<Volume> {
-    let expected = || refused(format!("{spec:?}: expected NAME:SIZE, NAME:XxYxZ or NAME:XxYxZ:SX,SY,SZ"));
-    let mut parts = spec.split(':');
+    let expected = || {
+        let forms = "builtin:NAME:SIZE, builtin:NAME:XxYxZ or builtin:NAME:XxYxZ:SX,SY,SZ";
+        let problem = format!("expected {forms} with sizes of at least 1 voxel, such as builtin:engine:128");
+        Error::Config { what: spec.into(), problem }
+    };
+    let mut parts = spec.strip_prefix("builtin:").ok_or_else(expected)?.split(':');
     let name = parts.next().unwrap_or_default();
-    let dims = numbers::<usize>(parts.next().ok_or_else(expected)?, 'x').ok_or_else(expected)?;
+    let dims = parts.next().and_then(|text| numbers::<usize>(text, 'x'));
+    let dims = dims.filter(|dims| !dims.contains(&0)).ok_or_else(expected)?;
     let spacing =
         parts.next().map_or(Some([1.0; 3]), |text| numbers::<f64>(text, ',')).ok_or_else(expected)?;
     match parts.next() {

@@ -27,6 +27,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::scene::VolumeSource;
 use grid::Grid;
 
 /// What `origin` and `directions` of a [`Volume`] refer to.
@@ -139,13 +140,26 @@ impl Volume {
     }
 }
 
-/// A volume by the name a user gives: a file ([`read`]), or `builtin:NAME:SIZE`.
+/// A volume by the name a user gives: a file ([`read`]), or `builtin:NAME:SIZE` ([`builtin::from_spec`]).
 ///
-/// Errors: those of [`read`]; [`Error::Config`] for a built-in that does not exist.
+/// Errors: those of [`read`] and [`builtin::from_spec`].
 pub fn open(spec: &str) -> Result<Volume> {
-    match spec.strip_prefix("builtin:") {
-        Some(builtin) => builtin::from_spec(builtin),
-        None => read(Path::new(spec)),
+    VolumeSource::parse(spec).open()
+}
+
+impl VolumeSource {
+    /// Makes or reads the volume.
+    ///
+    /// Errors: those of [`builtin::from_spec`], [`read`] and [`read_raw`].
+    pub fn open(&self) -> Result<Volume> {
+        match self {
+            Self::Builtin(spec) => builtin::from_spec(spec),
+            Self::File(path) => read(path),
+            Self::Raw { path, dims, kind, spacing_mm, big_endian } => {
+                let endian = if *big_endian { Endian::Big } else { Endian::Little };
+                read_raw(path, *dims, kind, endian, *spacing_mm)
+            }
+        }
     }
 }
 
@@ -195,7 +209,15 @@ fn bad(path: &Path, field: &str, problem: impl Into<String>) -> Error {
 fn assemble(path: &Path, dims: [usize; 3], grid: Grid, values: Values, scale: (f64, f64)) -> Result<Volume> {
     check_finite(dims, &values).map_err(|p| bad(path, "data", p))?;
     let Grid { spacing, origin, directions, space } = grid;
-    Ok(Volume { dims, spacing, origin, directions, space, values, slope: scale.0, intercept: scale.1 })
+    let (slope, intercept) = scale;
+    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept };
+    if scale != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
+        let problem = format!(
+            "slope {slope} and intercept {intercept} lead beyond all numbers, expected finite values"
+        );
+        return Err(bad(path, "data", problem));
+    }
+    Ok(volume)
 }
 
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];

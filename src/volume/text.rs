@@ -137,7 +137,10 @@ pub(super) fn data_files(
     let (names, piece): (Vec<String>, Option<u64>) = match words.as_slice() {
         [] => return Err(bad(path, field, "empty, expected a file name, a pattern or LIST")),
         ["LIST"] => (rest.to_vec(), None),
-        ["LIST", n] if n.parse::<u64>().is_ok() => (rest.to_vec(), n.parse().ok()),
+        // MetaIO writes the dimension as `2D`.
+        ["LIST", n] if n.trim_end_matches('D').parse::<u64>().is_ok() => {
+            (rest.to_vec(), n.trim_end_matches('D').parse().ok())
+        }
         [pattern, min, max, step, more @ ..] if pattern.contains('%') && more.len() <= 1 => {
             let piece = more.first().map(|n| n.parse());
             let (Ok(min), Ok(max), Ok(step), Ok(piece)) =

@@ -24,10 +24,14 @@ pub fn close(gpu: Gpu) {
 
 /// Compiles WGSL as the build does.
 pub fn compile(wgsl: &str) -> &'static Shader {
+    compile_with(wgsl, Options { bounds: Bounds::Unchecked, debug: false })
+}
+
+/// Compiles WGSL.
+pub fn compile_with(wgsl: &str, options: Options) -> &'static Shader {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.wgsl");
     std::fs::write(&path, wgsl).unwrap();
-    let options = Options { bounds: Bounds::Unchecked, debug: false };
     leak(compile::file(&path, options).unwrap_or_else(|e| panic!("{e}")))
 }
 

@@ -10,9 +10,15 @@ pub fn run(global: &Global) -> Result<ExitCode> {
     let mut out = Out::new(global);
     let devices = Gpu::list()?;
     for (i, device) in devices.iter().enumerate() {
-        out.line(format!("{i}  {device}"));
+        let [major, minor, patch] = device.api_version;
+        out.line(format!("{i}  {} ({}), Vulkan {major}.{minor}.{patch}", device.name, device.driver));
+        for lacking in &device.missing {
+            out.line(format!("   cannot be used: {lacking}"));
+        }
     }
-    let json = devices.iter().map(|d| serde_json::json!({ "name": d.name, "driver": d.driver }));
+    let json = devices
+        .iter()
+        .map(|d| serde_json::json!({ "name": d.name, "driver": d.driver, "missing": d.missing }));
     out.json(serde_json::json!({ "devices": json.collect::<Vec<_>>() }));
     out.finish()?;
     Ok(ExitCode::SUCCESS)

@@ -1,2 +1,37 @@
-//! x
-fn main(){}
+//! The program `cao`: files in, pictures and ambient volumes out.
+
+mod args;
+mod devices;
+mod info;
+mod occlusion;
+mod output;
+mod render;
+mod verify;
+
+use clap::{CommandFactory, FromArgMatches};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // Usage errors exit with 2 inside clap.
+    let matches = args::Cli::command().get_matches();
+    let cli = match args::Cli::from_arg_matches(&matches) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
+    // The order of --clip and --clip-* tells which belong together.
+    let of_command = matches.subcommand().map_or(&matches, |(_, command)| command);
+    let outcome = match &cli.command {
+        args::Command::Render(a) => render::run(&cli.global, a, of_command),
+        args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
+        args::Command::Verify(a) => verify::run(&cli.global, a, of_command),
+        args::Command::Info(a) => info::run(&cli.global, a),
+        args::Command::Devices => devices::run(&cli.global),
+    };
+    match outcome {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("cao: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! `cao occlusion`: the ambient volume of a volume, as a file.
+
+use crate::args::{self, Global, Occlusion};
+use crate::output::{Out, Progress, check_validation, open_gpu};
+use anyhow::Result;
+use cao::renderer::{COLOUR, Renderer, Setup};
+use cao::scene::Method;
+use cao::stage::lao::Scope;
+use cao::transfer::TransferFunction;
+use cao::volume::{Volume, write_nrrd};
+use clap::ArgMatches;
+use std::process::ExitCode;
+
+pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<ExitCode> {
+    let clips = args::clips(matches)?;
+    let volume = args.raw.open(&args.input)?;
+    let setup = setup(&args.settings, &volume, Method::Lao, !args.needed_only)?;
+    let transfer =
+        TransferFunction::load(args.settings.transfer.as_deref().unwrap_or("auto"), volume.range())?;
+    let gpu = open_gpu(global)?;
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
+    renderer.set_clips(&clips)?;
+    let mut progress = Progress::new("occlusion");
+    let timings = renderer.update(&mut |done| progress.set(done))?;
+    drop(progress);
+    check_validation(&gpu)?;
+
+    write_nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+    if let Some(path) = &args.opacity_out {
+        write_nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
+    }
+    if let Some(path) = &args.mask_out {
+        let mask: Vec<f32> = renderer.read_mask()?.into_iter().map(|m| f32::from(m) / 2.0).collect();
+        write_nrrd(path, &volume, &mask, "mask: 0 clipped, 0.5 affected, 1 untouched")?;
+    }
+
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    out.volume(&args.input, &volume);
+    out.setup(&setup, &volume);
+    out.categories(&renderer.categories()?);
+    out.timings(&timings);
+    out.wrote(&args.output);
+    for path in [&args.opacity_out, &args.mask_out].into_iter().flatten() {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The settings that the flags ask for; the paper's where they say nothing.
+pub fn setup(settings: &args::Settings, volume: &Volume, method: Method, all: bool) -> Result<Setup> {
+    let mut setup = Setup::paper(volume.min_spacing());
+    setup.method = settings.method.unwrap_or(method);
+    setup.scope = if all { Scope::All } else { Scope::Needed };
+    let occlusion = &mut setup.occlusion;
+    occlusion.rays = settings.rays.unwrap_or(occlusion.rays);
+    occlusion.quadrature = settings.quadrature.unwrap_or(occlusion.quadrature);
+    occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
+    occlusion.offset_mm = settings.offset_mm;
+    occlusion.step_mm = settings.step_mm;
+    occlusion.check(volume.min_spacing())?;
+    Ok(setup)
+}

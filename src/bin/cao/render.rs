@@ -1,0 +1,130 @@
+//! `cao render`: a picture for both eyes.
+
+use crate::args::{self, Global, Render};
+use crate::output::{Out, Progress, check_validation, open_gpu};
+use anyhow::{Result, bail};
+use cao::picture::Picture;
+use cao::renderer::{COLOUR, Renderer, Setup, StereoImage};
+use cao::scene::{Scene, TransferSource, Viewpoint, VolumeSource};
+use cao::stage::classify::AntiAliasing;
+use cao::stage::clips::MapSettings;
+use cao::stage::eyes::Look;
+use cao::stage::lao::Scope;
+use cao::transfer::TransferFunction;
+use clap::ArgMatches;
+use std::path::Path;
+use std::process::ExitCode;
+
+pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitCode> {
+    let mut scene = match args.input.to_lowercase().ends_with(".toml") {
+        true => Scene::load(Path::new(&args.input))?,
+        false => Scene::default_for(VolumeSource::parse(&args.input)),
+    };
+    override_scene(&mut scene, args, matches)?;
+    let volume = match args.raw.dims {
+        Some(_) => args.raw.open(&args.input)?,
+        None => scene.volume.open()?,
+    };
+    let transfer = match &args.settings.transfer {
+        Some(spec) => TransferFunction::load(spec, volume.range())?,
+        None => scene.transfer(volume.range())?,
+    };
+    let setup = Setup {
+        occlusion: scene.occlusion.resolve(volume.min_spacing())?,
+        method: scene.occlusion.method,
+        scope: if scene.occlusion.needed_only { Scope::Needed } else { Scope::All },
+        anti_aliasing: AntiAliasing::N32,
+        maps: MapSettings::default(),
+    };
+    let size = [scene.image.width, scene.image.height];
+    let rig = scene.stereo.rig(volume.size_mm());
+    let reach = (rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>()).max(1.0);
+    let views = rig.views(size[0] as f32 / size[1] as f32, reach * 1e-4, reach * 2.0)?;
+    let look = Look {
+        ambient: scene.shading.ambient,
+        diffuse: scene.shading.diffuse,
+        light: scene.shading.light,
+        step_mm: scene.image.step_mm,
+        jitter: scene.shading.jitter,
+        occluded: scene.shading.occlusion,
+        ..Look::default()
+    };
+
+    let gpu = open_gpu(global)?;
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
+    renderer.set_clips(&scene.clips)?;
+    let mut progress = Progress::new("occlusion");
+    let mut timings = renderer.update(&mut |done| progress.set(done))?;
+    drop(progress);
+    let (image, draw) = renderer.draw(&views, &look, size)?;
+    timings.extend(draw);
+    check_validation(&gpu)?;
+
+    let written = write(args, &image, scene.image.background)?;
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    out.volume(&args.input, &volume);
+    out.setup(&setup, &volume);
+    out.line(format!("image     2 x {} x {} pixels", size[0], size[1]));
+    out.timings(&timings);
+    out.memory(&gpu, &volume);
+    for path in written {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Flags win over the scene file; clips from flags are added to the scene's.
+fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Result<()> {
+    let s = &args.settings;
+    let o = &mut scene.occlusion;
+    o.rays = s.rays.unwrap_or(o.rays);
+    o.quadrature = s.quadrature.unwrap_or(o.quadrature);
+    o.method = s.method.unwrap_or(o.method);
+    o.radius_mm = s.radius_mm.or(o.radius_mm);
+    o.offset_mm = s.offset_mm.or(o.offset_mm);
+    o.step_mm = s.step_mm.or(o.step_mm);
+    if s.transfer.is_some() {
+        scene.transfer = TransferSource::Preset("auto".into());
+    }
+    scene.clips.extend(args::clips(matches)?);
+    if let Some([width, height]) = args.size {
+        (scene.image.width, scene.image.height) = (width, height);
+    }
+    if args.azimuth.is_some() || args.elevation.is_some() || args.distance.is_some() {
+        let (mut azimuth, mut elevation, mut distance) = (30.0, 25.0, None);
+        if let Viewpoint::Framing { azimuth_deg, elevation_deg, distance_mm } = scene.stereo.viewpoint {
+            (azimuth, elevation, distance) = (azimuth_deg, elevation_deg, distance_mm);
+        }
+        scene.stereo.viewpoint = Viewpoint::Framing {
+            azimuth_deg: args.azimuth.unwrap_or(azimuth),
+            elevation_deg: args.elevation.unwrap_or(elevation),
+            distance_mm: args.distance.or(distance),
+        };
+    }
+    if args.distance.is_some_and(|d| !(d > 0.0 && d.is_finite())) {
+        bail!("--distance: expected a length > 0 mm");
+    }
+    scene.stereo.ipd_mm = args.ipd.or(scene.stereo.ipd_mm);
+    scene.shading.occlusion &= !args.solid;
+    Ok(())
+}
+
+fn write<'a>(args: &'a Render, image: &StereoImage, background: [f32; 3]) -> Result<Vec<&'a Path>> {
+    let [width, height] = image.size;
+    let [left, right] = &image.colour;
+    let (left, right) =
+        (Picture::over(width, height, left, background), Picture::over(width, height, right, background));
+    let mut written = Vec::new();
+    if let Some(path) = &args.output {
+        Picture::beside(&left, &right).write_png(path)?;
+        written.push(path.as_path());
+    }
+    if let [left_path, right_path] = args.eyes.as_slice() {
+        left.write_png(left_path)?;
+        right.write_png(right_path)?;
+        written.extend([left_path.as_path(), right_path.as_path()]);
+    }
+    Ok(written)
+}
