@@ -249,7 +249,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// The same on the device's own queue, in parts, telling `progress` the share done of each full computation. Waits for
+    /// The same on the device's own queue, in parts, telling `progress` the share done of each long stage. Waits for
     /// the end; returns the time of each stage in ms, clip meshes prepared since the last update included.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
         let settings = self.settings();
@@ -269,16 +269,16 @@ impl Renderer {
             rec.submit_and_wait()?;
         }
         if self.stale.ambient {
-            let mut rec = self.gpu.recorder("update")?;
+            let mut rec = self.gpu.recorder("clips")?;
             self.record_clips(&mut rec)?;
-            if self.setup.method == Method::Cao {
-                cao::record(&mut rec, field, kernels, volumes, &settings)?;
-            }
             timings.extend(rec.submit_and_wait()?);
-            if self.setup.method == Method::Lao {
-                let (from, to) = (&volumes.opacity, &volumes.ambient);
-                timings.extend(lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?);
-            }
+            timings.extend(match self.setup.method {
+                Method::Cao => cao::run(&self.gpu, field, kernels, volumes, &settings, progress)?,
+                Method::Lao => {
+                    let (from, to) = (&volumes.opacity, &volumes.ambient);
+                    lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?
+                }
+            });
         }
         self.updated();
         Ok(timings)

@@ -137,11 +137,12 @@ impl Lao {
         occlusion: &Occlusion,
         reference_mm: f32,
         scope: Scope,
+        work: Work,
         bindings: Bindings,
         base: u32,
         count: u32,
     ) -> Result<()> {
-        let params = params(field, occlusion, reference_mm, scope, Work::Full, base);
+        let params = params(field, occlusion, reference_mm, scope, work, base);
         let groups = super::row_of_groups(count);
         rec.dispatch(&self.pipeline, &self.binds(bindings), bytemuck::bytes_of(&params), groups)
     }
