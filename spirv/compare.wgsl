@@ -1,9 +1,11 @@
 // Bit by bit comparison of two ambient volumes on every voxel that has a value: all but clipped voxels that touch no visible
-// one, and, where only needed voxels are computed, voxels without opacity in their 3x3x3.
+// one, and, where only needed voxels are computed, voxels without opacity in their 3x3x3. The list holds the bricks of the
+// full computation; no other brick has such voxels.
 
 struct CompareParams {
     dims: vec3<u32>,
     only_needed: u32,
+    bricks: vec3<u32>,
 }
 
 struct Difference {
@@ -15,6 +17,8 @@ struct Difference {
     recomputed: atomic<u32>,
 }
 
+#include "shared/bricks.wgsl"
+
 const CLIPPED = 0u;
 const UNTOUCHED = 2u;
 
@@ -23,18 +27,16 @@ var<immediate> params: CompareParams;
 @group(0) @binding(1) var mask: texture_3d<u32>;
 @group(0) @binding(2) var expected: texture_3d<f32>;
 @group(0) @binding(3) var actual: texture_3d<f32>;
-@group(0) @binding(4) var<storage, read_write> difference: Difference;
+@group(0) @binding(4) var<storage, read> list: BrickList;
+@group(0) @binding(5) var<storage, read_write> difference: Difference;
 
-@compute @workgroup_size(8, 8, 4)
-fn main(@builtin(global_invocation_id) voxel: vec3<u32>) {
-    if any(voxel >= params.dims) {
-        return;
-    }
+fn compare(voxel: vec3<u32>) {
+    let category = textureLoad(mask, voxel, 0).r;
+    var touches_visible = category != CLIPPED;
+    var touches_opacity = params.only_needed == 0u || textureLoad(opacity, voxel, 0).r > 0.0;
     let last = min(voxel + 1u, params.dims - 1u);
     let first = max(voxel, vec3(1u)) - 1u;
-    var touches_visible = false;
-    var touches_opacity = params.only_needed == 0u;
-    for (var z = first.z; z <= last.z; z++) {
+    for (var z = first.z; z <= last.z && !(touches_visible && touches_opacity); z++) {
         for (var y = first.y; y <= last.y; y++) {
             for (var x = first.x; x <= last.x; x++) {
                 touches_visible = touches_visible || textureLoad(mask, vec3(x, y, z), 0).r != CLIPPED;
@@ -46,7 +48,7 @@ fn main(@builtin(global_invocation_id) voxel: vec3<u32>) {
         return;
     }
     atomicAdd(&difference.compared, 1u);
-    if textureLoad(mask, voxel, 0).r != UNTOUCHED {
+    if category != UNTOUCHED {
         atomicAdd(&difference.recomputed, 1u);
     }
     let e = textureLoad(expected, voxel, 0).r;
@@ -54,5 +56,21 @@ fn main(@builtin(global_invocation_id) voxel: vec3<u32>) {
     if bitcast<u32>(e) != bitcast<u32>(a) {
         atomicAdd(&difference.different, 1u);
         atomicMax(&difference.largest, bitcast<u32>(abs(e - a)));
+    }
+}
+
+// One workgroup a brick; each invocation takes two slices.
+@compute @workgroup_size(8, 8, 4)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let entry = group.x + group.y * GROUPS_PER_ROW;
+    if entry >= list.count {
+        return;
+    }
+    let corner = brick_at(list.items[entry], params.bricks) * 8u;
+    for (var slice = 0u; slice < 8u; slice += 4u) {
+        let voxel = corner + local + vec3(0u, 0u, slice);
+        if all(voxel < params.dims) {
+            compare(voxel);
+        }
     }
 }

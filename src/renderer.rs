@@ -447,6 +447,7 @@ impl Renderer {
             &self.gpu,
             &self.field,
             self.setup.scope,
+            &v.list,
             &v.opacity,
             &v.mask,
             &expected,

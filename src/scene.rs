@@ -68,7 +68,7 @@ use toml::Value;
 use crate::clip::{Clip, Mode, Pose, Shape};
 use crate::mesh::TriangleMesh;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::transfer::{TransferFunction, number, parse_colour, shown};
+use crate::transfer::{TransferFunction, in_line, number, parse_colour, shown};
 use crate::view::StereoRig;
 use crate::{Error, Result};
 
@@ -357,7 +357,8 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`], with [`Error::Config`] in place of [`Error::File`].
     pub fn from_toml(text: &str, base: &Path) -> Result<Self> {
-        let file: SceneFile = toml::from_str(text).map_err(|error| refused("scene", error.to_string()))?;
+        let file: SceneFile =
+            toml::from_str(text).map_err(|error| refused("scene", in_line(text, &error)))?;
         if file.clip.len() > Clip::MAX {
             return Err(refused(
                 "clip",

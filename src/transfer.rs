@@ -180,7 +180,7 @@ impl TransferFunction {
     /// [`Error::Config`] naming the key, what it holds and what would do.
     pub fn from_toml(text: &str) -> Result<Self> {
         let table: toml::Table =
-            toml::from_str(text).map_err(|error| refused("transfer function", error.to_string()))?;
+            toml::from_str(text).map_err(|error| refused("transfer function", in_line(text, &error)))?;
         Self::from_table(table)
     }
 
@@ -365,6 +365,20 @@ fn list<'a>(key: &str, value: &'a Value) -> Result<&'a [Value]> {
         .as_array()
         .map(Vec::as_slice)
         .ok_or_else(|| refused(key, format!("{}: expected a list of [value, {key}]", shown(value))))
+}
+
+/// What the TOML reader found wrong with `text`, and where, in one line.
+pub(crate) fn in_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().lines().map(str::trim).collect::<Vec<_>>().join(" ");
+    match error.span() {
+        None => message,
+        Some(span) => {
+            let before = text.get(..span.start).unwrap_or(text);
+            let line = before.matches('\n').count() + 1;
+            let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+            format!("TOML parse error at line {line}, column {column}: {message}")
+        }
+    }
 }
 
 /// A value as the user wrote it, or near enough to find it.

@@ -40,11 +40,7 @@ fn list(
     let count = content[3] as usize;
     let mut items = content[4..4 + count].to_vec();
     items.sort_unstable();
-    (
-        items,
-        [content[0], content[1], content[2]],
-        bytemuck::pod_collect_to_vec(&read_buffer(gpu, &before)),
-    )
+    (items, [content[0], content[1], content[2]], bytemuck::pod_collect_to_vec(&read_buffer(gpu, &before)))
 }
 
 fn bricks_where(grid: &Grid, wanted: impl Fn([usize; 3]) -> bool) -> Vec<u32> {
@@ -94,16 +90,15 @@ fn each_wanted_brick_is_listed_once_and_no_other() {
             let before: Vec<u32> = (0..count).map(|_| u32::from(random.below(4) == 0)).collect();
             let context = format!("{:?} turn {turn}", grid.dims);
 
-            let (found, groups, marks) =
-                list(&gpu, &kernel, &field, Which::All, &opacity, &mask, &before);
+            let (found, groups, marks) = list(&gpu, &kernel, &field, Which::All, &opacity, &mask, &before);
             assert_eq!(found, (0..count).collect::<Vec<_>>(), "{context}");
             assert_eq!((groups, &marks), ([count, 1, 1], &before), "{context}");
 
             let needed = bricks_where(&grid, |voxel| {
-                opacity[grid.index(voxel)] > 0.0 || grid.neighbours(voxel).any(|n| opacity[grid.index(n)] > 0.0)
+                opacity[grid.index(voxel)] > 0.0
+                    || grid.neighbours(voxel).any(|n| opacity[grid.index(n)] > 0.0)
             });
-            let (found, groups, marks) =
-                list(&gpu, &kernel, &field, Which::Needed, &opacity, &mask, &before);
+            let (found, groups, marks) = list(&gpu, &kernel, &field, Which::Needed, &opacity, &mask, &before);
             assert_eq!(found, needed, "{context}");
             let some = u32::from(!needed.is_empty());
             assert_eq!((groups, &marks), ([needed.len() as u32, some, 1], &before), "{context}");

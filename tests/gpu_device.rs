@@ -152,6 +152,28 @@ fn everything_keeps_the_device_alive_until_it_is_dropped() {
 }
 
 #[test]
+fn what_belongs_to_another_device_is_refused() {
+    let (ours, theirs) = (open(), open());
+    let shader = compile(
+        "@group(0) @binding(0) var<storage, read_write> b: array<u32>;
+         @compute @workgroup_size(1) fn main() { b[0] = 1u; }",
+    );
+    let pipelines = [&ours, &theirs].map(|gpu| gpu.compute(shader, "main").unwrap());
+    let buffers = [&ours, &theirs].map(|gpu| device_buffer(gpu, "x", &[0; 4]));
+    let mut rec = ours.recorder("test").unwrap();
+    for (pipeline, buffer, fine) in [(0, 0, true), (0, 1, false), (1, 0, false), (1, 1, false)] {
+        let result = rec.dispatch(&pipelines[pipeline], &[bind("b", &buffers[buffer])], &[], [1; 3]);
+        assert_eq!(result.is_ok(), fine, "{result:?}");
+        assert!(fine || result.unwrap_err().to_string().contains("another device"));
+    }
+    assert!(rec.copy_buffer(&buffers[0], 0, &buffers[1], 0, 4).is_err());
+    rec.submit_and_wait().unwrap();
+    drop((pipelines, buffers));
+    close(ours);
+    close(theirs);
+}
+
+#[test]
 fn devices_can_be_opened_side_by_side_from_threads() {
     let threads: Vec<_> = (0..3)
         .map(|i| {

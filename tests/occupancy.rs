@@ -15,8 +15,7 @@ use common::*;
 fn on_device(gpu: &Gpu, kernel: &Occupancy, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
     let field = Field::upload(gpu, volume).unwrap();
     let points = TransferBuffer::new(gpu).unwrap();
-    let occupancy =
-        gpu.buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device).unwrap();
+    let occupancy = gpu.buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device).unwrap();
     run(gpu, |rec| {
         points.record(rec, transfer).unwrap();
         rec.barrier(&[], &[Access::StorageWrite]);

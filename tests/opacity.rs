@@ -81,9 +81,10 @@ fn opacity_is_the_transfer_function_of_every_type_and_size() {
                 white(&[[at(0.1), 0.0], [at(0.4), 0.7], [at(0.5), 0.2], [at(0.9) + 1.0, 1.0]]),
                 white(&[[at(0.5), 0.6]]),
             ] {
-                let tolerance =
-                    steepest(&transfer) * VALUE_ROUNDING * (range * volume.slope.abs() + volume.intercept.abs())
-                        + OPACITY_ROUNDING;
+                let tolerance = steepest(&transfer)
+                    * VALUE_ROUNDING
+                    * (range * volume.slope.abs() + volume.intercept.abs())
+                    + OPACITY_ROUNDING;
                 let expected = cpu::opacity::opacity(&volume, &transfer);
                 let found = on_device(&gpu, &kernel, &volume, &transfer);
                 for i in 0..volume.len() {

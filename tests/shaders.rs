@@ -115,6 +115,11 @@ const SAMPLER: &str = "
 fn reflection_says_what_each_entry_point_touches() {
     let s = compile_text(SAMPLER).unwrap();
     assert_valid(&s, "SAMPLER");
+    let folder = files(&[("main.wgsl", SAMPLER)]);
+    assert_valid(
+        &compile::file(&folder.path().join("main.wgsl"), CHECKED).unwrap(),
+        "SAMPLER with bounds checks",
+    );
     let names: Vec<_> = s.bindings.iter().map(|b| (b.binding, b.name.as_str())).collect();
     let expected = [
         (0, "lengths"),

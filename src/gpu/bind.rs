@@ -108,6 +108,9 @@ fn one<'a>(
         (BindingKind::Sampled | BindingKind::StorageImage, Bind::Layer(image, layer)) => {
             image_view(pipeline, slot, name, image, Some(layer), out)
         }
+        (BindingKind::Sampler, Bind::Sampler(sampler)) if !Arc::ptr_eq(&sampler.0.gpu, &pipeline.gpu) => {
+            Err("is given a sampler of another device".into())
+        }
         (BindingKind::Sampler, Bind::Sampler(sampler)) => {
             out.keep.push(sampler.0.clone());
             Ok(Descriptor::Image([vk::DescriptorImageInfo::default().sampler(sampler.0.raw)]))

@@ -76,7 +76,7 @@ impl Gpu {
         // SAFETY: the device is alive; sizes above its limits are refused by it.
         let raw =
             unsafe { gpu.device.create_buffer(&create, None) }.map_err(vulkan("vkCreateBuffer", name))?;
-        let id = gpu.new_id();
+        let id = Inner::new_id();
         // From here on the drop of `buffer` cleans up.
         let buffer = BufferInner {
             gpu: gpu.clone(),

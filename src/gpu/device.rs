@@ -43,6 +43,9 @@ pub struct Adopted {
     pub device: ash::Device,
     /// Family of the queue that will run the recorded commands; must do graphics and compute.
     pub queue_family: u32,
+    /// A queue of that family lent to the calls that say they use one (uploads, read-backs, new clip meshes): during such a call
+    /// nobody else may use it. `None`: those calls refuse, and recording into the host's command buffers is all there is.
+    pub queue: Option<vk::Queue>,
 }
 
 /// What everything made with a [`Gpu`] shares.
@@ -62,7 +65,6 @@ pub(crate) struct Inner {
     pub instance: ash::Instance,
     pub log: ValidationLog,
     hazards: Mutex<Hazards>,
-    next_id: AtomicU64,
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
     /// The loaded library, which all function pointers point into.
@@ -232,12 +234,13 @@ impl Gpu {
         Ok((physical, info.clone(), device.map_err(vulkan("vkCreateDevice", &info.name))?, family))
     }
 
-    /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers; nothing here submits, waits or
-    /// touches a queue, and [`Gpu::recorder`] refuses.
+    /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers and nothing submits or waits, except
+    /// calls that say so, on the queue that the host lent; without one, [`Gpu::recorder`] refuses.
     ///
     /// # Safety
     /// The handles must be valid and belong together, be made with Vulkan 1.3 or newer and with [`Gpu::required_extensions`] and
-    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped.
+    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped. A lent queue must not be used by others during calls that
+    /// use it.
     ///
     /// # Errors
     /// [`Error::Device`] if the physical device lacks something that is needed.
@@ -251,7 +254,7 @@ impl Gpu {
             info,
             device: host.device,
             family: host.queue_family,
-            queue: None,
+            queue: host.queue,
             debug: false,
             log: ValidationLog::default(),
         };
@@ -342,7 +345,6 @@ impl Parts {
             physical,
             log,
             hazards: Mutex::default(),
-            next_id: AtomicU64::new(1),
             owned,
             _entry: entry,
             device,
@@ -357,9 +359,10 @@ impl Inner {
         self.hazards.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A number that no other resource of this device has or had.
-    pub fn new_id(&self) -> ResourceId {
-        self.next_id.fetch_add(1, Ordering::Relaxed)
+    /// A number that no other resource of any device has or had.
+    pub fn new_id() -> ResourceId {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        NEXT.fetch_add(1, Ordering::Relaxed)
     }
 
     /// Names an object for debuggers and for the validation layer's messages.

@@ -12,7 +12,7 @@
 use super::access::Access;
 use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
-/// Identity of a buffer or image, never reused (a driver reuses its handles).
+/// Identity of a buffer or image, never reused (a driver reuses its handles), not by another device either.
 pub type ResourceId = u64;
 
 /// One way in which one command touches one resource.
@@ -114,7 +114,12 @@ impl Hazards {
     }
 
     fn check(&self, command: &str, touch: &Touch<'_>) -> Result<(), String> {
-        let Some(state) = self.resources.get(&touch.id) else { return Ok(()) };
+        let Some(state) = self.resources.get(&touch.id) else {
+            return Err(format!(
+                "{command} uses {} as `{}`, which belongs to another device",
+                touch.name, touch.via
+            ));
+        };
         if state.undefined {
             return Err(format!(
                 "{command} uses image {} as `{}` before anything gave it a layout; add `rec.discard(&image)` once before its first use",
@@ -153,7 +158,7 @@ impl Hazards {
     }
 
     fn record(&mut self, command: &Arc<str>, touch: &Touch<'_>) {
-        let state = self.resources.entry(touch.id).or_default();
+        let Some(state) = self.resources.get_mut(&touch.id) else { return };
         // What lies below a write has been ordered before it: who waits for the write waits for that. A read takes the place of
         // reads of its own kind only.
         let (before, kept): (Vec<_>, Vec<_>) = std::mem::take(&mut state.pending)
@@ -349,6 +354,13 @@ mod tests {
         let message = state().command("a", &[touch(SampledRead), other.clone()]).unwrap_err();
         assert!(message.contains("`x`") && message.contains("`y`"), "{message}");
         state().command("a", &[touch(SampledRead), Touch { range: 16..32, ..other }]).unwrap();
+    }
+
+    #[test]
+    fn a_resource_of_another_device_is_refused() {
+        assert!(
+            Hazards::default().command("a", &[touch(SampledRead)]).unwrap_err().contains("another device")
+        );
     }
 
     #[test]

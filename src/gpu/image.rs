@@ -101,7 +101,7 @@ impl Gpu {
             .initial_layout(vk::ImageLayout::UNDEFINED);
         // SAFETY: the device is alive; size, format and usage were checked against it.
         let raw = unsafe { gpu.device.create_image(&create, None) }.map_err(vulkan("vkCreateImage", name))?;
-        let id = gpu.new_id();
+        let id = Inner::new_id();
         // From here on the drop of `image` cleans up.
         let mut image = ImageInner {
             gpu: gpu.clone(),
@@ -284,7 +284,7 @@ pub struct SamplerDesc {
 pub struct Sampler(pub(crate) Arc<SamplerInner>);
 
 pub(crate) struct SamplerInner {
-    gpu: Arc<Inner>,
+    pub gpu: Arc<Inner>,
     pub raw: vk::Sampler,
 }
 

@@ -93,8 +93,11 @@ impl Gpu {
 
 impl Recorder {
     /// Gives up an image's content and moves it to the GENERAL layout, in which it stays; once before its first use. It waits for
-    /// all that was recorded before, and all that follows waits for it.
+    /// all that was recorded before, and all that follows waits for it. An image of another device is left alone; its uses are refused.
     pub fn discard(&mut self, image: &Image) {
+        if !Arc::ptr_eq(&image.0.gpu, &self.gpu) {
+            return;
+        }
         use vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
         let barrier = [vk::ImageMemoryBarrier2::default()
             .src_stage_mask(S::ALL_COMMANDS)
@@ -315,7 +318,9 @@ impl Recorder {
         push: &[u8],
     ) -> Result<Resolved<'a>> {
         let inner = &pipeline.0;
-        let problem = if inner.targets.is_some() != (point == vk::PipelineBindPoint::GRAPHICS) {
+        let problem = if !Arc::ptr_eq(&inner.gpu, &self.gpu) {
+            "belongs to another device".into()
+        } else if inner.targets.is_some() != (point == vk::PipelineBindPoint::GRAPHICS) {
             "is a pipeline of the other kind (compute pipelines are dispatched, graphics pipelines draw)"
                 .into()
         } else if push.len() != inner.push_bytes as usize {

@@ -153,15 +153,6 @@ mod tests {
     }
 
     #[test]
-    fn a_muted_hint_is_dropped_and_an_error_of_the_same_id_is_kept() {
-        let log = ValidationLog::default();
-        keep(&log.0, MUTED[0].id, "For optimal performance image should be in another layout");
-        log.assert_clean().unwrap();
-        keep(&log.0, MUTED[0].id, "image is in another layout than expected");
-        log.assert_clean().unwrap_err();
-    }
-
-    #[test]
     fn a_message_fails_the_log() {
         let log = ValidationLog::default();
         log.assert_clean().unwrap();

@@ -83,7 +83,10 @@ impl Report {
 }
 
 /// Points at which the eyes are compared, before asking which of them both eyes see.
-const CANDIDATES: u64 = 20_000;
+const CANDIDATES: usize = 20_000;
+
+/// Opacity from which a voxel belongs to a surface.
+const SOLID: f32 = 0.05;
 
 /// A point counts as seen when at least this much of its light reaches the eye.
 const SEEN: f32 = 0.3;
@@ -166,10 +169,17 @@ pub fn compare_eyes(renderer: &Renderer, random: &mut Random) -> Result<Stereo> 
 
     let opacity = renderer.read_opacity()?;
     let mut points = Vec::new();
-    for _ in 0..CANDIDATES {
+    let [x, y, _] = field.dims.map(|d| d as usize);
+    // On surfaces, where eyes look: opaque beside transparent.
+    let surface = |voxel: usize| {
+        let beside = [voxel.wrapping_sub(1), voxel + 1, voxel.wrapping_sub(x), voxel + x];
+        let beyond = [voxel.wrapping_sub(x * y), voxel + x * y];
+        let clear = |n: &usize| opacity.get(*n).is_none_or(|a| *a <= SOLID);
+        opacity[voxel] > SOLID && beside.iter().chain(&beyond).any(clear)
+    };
+    for _ in 0..100 * CANDIDATES {
         let voxel = random.below(opacity.len() as u64) as usize;
-        if opacity[voxel] > 0.05 {
-            let [x, y, _] = field.dims.map(|d| d as usize);
+        if points.len() < CANDIDATES && surface(voxel) {
             let index = Vec3::new((voxel % x) as f32, (voxel / x % y) as f32, (voxel / (x * y)) as f32);
             let dims = Vec3::from_array(field.dims.map(|d| d as f32));
             points.push((index - 0.5 * (dims - 1.0)) * Vec3::from_array(field.spacing));

@@ -72,7 +72,7 @@ impl MapSettings {
             return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
         }
         if self.cells == 0
-            || self.resolution % self.cells != 0
+            || !self.resolution.is_multiple_of(self.cells)
             || (self.literal && self.cells != self.resolution)
         {
             let wanted = if self.literal {

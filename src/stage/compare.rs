@@ -1,7 +1,8 @@
 //! Bitwise comparison of two ambient volumes on every voxel that has a value (CAO §4: "exactly the same").
 //!
-//! In: `expected`, `actual` (3D r32float), `mask`, `opacity`. Out: [`Difference`]. Cost: up to 27 reads a voxel.
+//! In: `expected`, `actual` (3D r32float), `mask`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
 
+use super::bricks::BrickList;
 use super::field::Field;
 use super::lao::Scope;
 use crate::Result;
@@ -14,8 +15,10 @@ use bytemuck::{Pod, Zeroable};
 struct Params {
     dims: [u32; 3],
     only_needed: u32,
+    bricks: [u32; 3],
+    pad: u32,
 }
-layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed });
+layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed, bricks });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -51,13 +54,14 @@ impl Compare {
         Ok(Self { pipeline: gpu.compute(&shaders::compare::SHADER, "main")? })
     }
 
-    /// Compares two ambient volumes. Uses the device's queue and waits for it.
+    /// Compares two ambient volumes on the bricks of the list that the full computation worked on. Uses the device's queue and waits for it.
     #[expect(clippy::too_many_arguments, reason = "each is one binding or parameter of the kernel")]
     pub fn run(
         &self,
         gpu: &Gpu,
         field: &Field,
         scope: Scope,
+        list: &BrickList,
         opacity: &Image,
         mask: &Image,
         expected: &Image,
@@ -69,15 +73,21 @@ impl Compare {
         let mut rec = gpu.recorder("compare")?;
         rec.fill(&difference, 0, bytes, 0)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-        let params = Params { dims: field.dims, only_needed: u32::from(scope == Scope::Needed) };
+        let params = Params {
+            dims: field.dims,
+            only_needed: u32::from(scope == Scope::Needed),
+            bricks: field.bricks(),
+            pad: 0,
+        };
         let binds = [
             ("opacity", Bind::Image(opacity)),
             ("mask", Bind::Image(mask)),
             ("expected", Bind::Image(expected)),
             ("actual", Bind::Image(actual)),
+            ("list", Bind::Buffer(&list.buffer)),
             ("difference", Bind::Buffer(&difference)),
         ];
-        rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)?;
+        rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), &list.buffer, 0)?;
         rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(&difference, 0, &read_back, 0, bytes)?;
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);

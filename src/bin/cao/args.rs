@@ -1,15 +1,27 @@
 //! Flags and their meaning, one place for all commands.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
 use cao::clip::{Clip, Mode, Pose, Shape};
 use cao::mesh::TriangleMesh;
 use cao::occlusion::{Quadrature, RaySet};
-use cao::scene::Method;
-use cao::volume::{self, Endian, Volume};
+use cao::scene::{Method, VolumeSource};
+use cao::volume::{Endian, Volume};
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Arc;
+
+/// Flags that contradict each other, beyond what the parser of the command line can tell: exit code 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(String);
+
+/// A [`Usage`] error.
+pub fn usage(problem: impl Into<String>) -> anyhow::Error {
+    Usage(problem.into()).into()
+}
 
 /// Volumes with ambient occlusion, for both eyes, exact under clipping.
 #[derive(Parser)]
@@ -21,27 +33,33 @@ pub struct Cli {
     pub command: Command,
 }
 
-const EXAMPLES: &str = "Examples:
+const EXAMPLES: &str = "\
+Examples:
   cao render builtin:engine:128 -o stereo.png
-  cao render head.nrrd --transfer ct-bone --clip plane --clip-rotate 0,90,0 -o stereo.png
   cao render scene.toml --eyes left.png,right.png
-  cao occlusion head.nii.gz --transfer ct-bone --rays 26w --radius-mm 20 -o ao.nrrd
+  cao occlusion head.nii.gz --transfer ct-bone --rays 26w -o ao.nrrd
   cao verify builtin:fruit:64 --poses 10 --seed 7
   cao info head.nrrd
+More in `cao render --help` and so on.
 
-Built-in volumes are named like files: builtin:NAME:SIZE, NAME one of engine, fruit, skeleton, empty, uniform,
-half-space, voxel, sheets. Lengths are millimetres, angles degrees.";
+Volumes: NRRD, NIfTI, MetaImage, raw values with --dims and --type, and
+built-in ones, named like files: builtin:NAME:SIZE, with NAME one of
+engine, fruit, skeleton, empty, uniform, half-space, voxel, sheets.
+Lengths are millimetres, angles degrees, axes those of the volume,
+with the origin at its centre.
+
+Exit codes: 0 done, 1 failed (verify: something differs), 2 wrong usage.";
 
 #[derive(Args)]
 pub struct Global {
     /// Device to use: its number or part of its name, as `cao devices` lists them [env: CAO_DEVICE]
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Everywhere")]
     pub device: Option<String>,
     /// Run under the Vulkan validation layer and fail if it reports anything [env: CAO_VALIDATION=1]
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Everywhere")]
     pub validate: bool,
     /// Print one JSON object instead of text
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Everywhere")]
     pub json: bool,
 }
 
@@ -50,10 +68,10 @@ pub enum Command {
     /// Draw a scene or a volume for both eyes
     #[command(after_help = RENDER_EXAMPLES)]
     Render(Render),
-    /// Write the ambient volume of a volume as f32 NRRD
+    /// Write a volume's ambient occlusion as a volume: 0 fully occluded, 1 unobstructed
     #[command(after_help = OCCLUSION_EXAMPLES)]
     Occlusion(Occlusion),
-    /// Check that contextual equals full recomputation bit for bit, and left eye right eye
+    /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(Verify),
     /// Show a volume's header, value range and histogram
@@ -62,81 +80,91 @@ pub enum Command {
     Devices,
 }
 
-const RENDER_EXAMPLES: &str = "Examples:
-  cao render builtin:engine:128 --clip sphere --clip-scale 40 --clip-translate 38,-38,38 -o stereo.png
-  cao render head.nrrd --transfer ct-bone --clip box --clip-mode keep --clip-scale 60,80,90 -o stereo.png
-  cao render head.nrrd --clip tool.obj --clip plane --clip-rotate 0,90,0 --eyes left.png,right.png";
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  cao render builtin:engine:128 -o stereo.png \\
+      --clip sphere --clip-scale 40 --clip-translate 38,-38,38
+  cao render head.nrrd --transfer ct-bone -o stereo.png \\
+      --clip box --clip-mode keep --clip-scale 60,80,90
+  cao render head.nrrd --eyes left.png,right.png \\
+      --clip tool.obj --clip plane --clip-rotate 0,90,0";
 
-const OCCLUSION_EXAMPLES: &str = "Examples:
+const OCCLUSION_EXAMPLES: &str = "\
+Examples:
   cao occlusion head.nrrd --transfer ct-bone -o ao.nrrd
-  cao occlusion ct.raw --dims 512,512,110 --type int16 --spacing 0.7,0.7,1.5 --rays 50w --quadrature segment -o ao.nrrd
-  cao occlusion builtin:engine:64 --method cao --clip torus --clip-scale 20 -o ao.nrrd --mask-out vm.nrrd";
+  cao occlusion ct.raw --dims 512,512,110 --type int16 --spacing 0.7,0.7,1.5 \\
+      --rays 50w --quadrature segment -o ao.nrrd
+  cao occlusion builtin:engine:64 --method cao --clip torus --clip-scale 20 \\
+      -o ao.nrrd --mask-out vm.nrrd";
 
-const VERIFY_EXAMPLES: &str = "Examples:
-  cao verify                                all built-in scenes
+const VERIFY_EXAMPLES: &str = "\
+Examples:
+  cao verify                       all built-in scenes
   cao verify builtin:skeleton:64 --poses 20 --seed 3
-  cao verify head.nrrd --transfer ct-bone --poses 5 --shapes sphere,torus,tool.obj";
+  cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
+
+Exit code 1 if any voxel or any point that both eyes see differs.";
 
 /// How to read a file that holds nothing but values.
-#[derive(Args, Default)]
+#[derive(Args)]
+#[command(next_help_heading = "Raw data")]
 pub struct Raw {
-    /// Raw data: voxels along x, y, z
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<usize>)]
+    /// The input is raw values: voxels along x, y, z, x fastest
+    #[arg(long, value_name = "X,Y,Z", value_parser = dims, requires = "kind")]
     pub dims: Option<[usize; 3]>,
-    /// Raw data: type of the values, such as uint8, int16, float32
+    /// Type of the values, such as uint8, int16, float32
     #[arg(long = "type", value_name = "TYPE", requires = "dims")]
     pub kind: Option<String>,
-    /// Raw data: distance of voxel centres in mm
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<f64>, requires = "dims")]
+    /// Distance of voxel centres in mm [default: 1,1,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<f64>, allow_hyphen_values = true, requires = "dims")]
     pub spacing: Option<[f64; 3]>,
-    /// Raw data: byte order, little or big
-    #[arg(long, default_value = "little")]
-    pub endian: String,
+    /// Order of a value's bytes: little or big [default: little]
+    #[arg(long, value_name = "ORDER", value_parser = endian, requires = "dims")]
+    pub endian: Option<Endian>,
 }
 
 /// How occlusion is computed.
 #[derive(Args)]
+#[command(next_help_heading = "Occlusion")]
 pub struct Settings {
-    /// Transfer function: a TOML file, or auto, ct-bone, ct-soft, mr, paper
+    /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
     #[arg(long, value_name = "FILE|PRESET")]
     pub transfer: Option<String>,
-    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted
+    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26]
     #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
     pub rays: Option<RaySet>,
-    /// Rule along a ray: left (the paper's sum), cell, segment
+    /// Rule along a ray: left (the paper's sum), cell, segment [default: left]
     #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
     pub quadrature: Option<Quadrature>,
-    /// Radius of the neighbourhood in mm [default: 20 of the smallest spacing]
-    #[arg(long, value_name = "R", allow_negative_numbers = true)]
+    /// Length of the rays in mm [default: 20 times the smallest spacing]
+    #[arg(long, value_name = "R", value_parser = length, allow_hyphen_values = true)]
     pub radius_mm: Option<f32>,
-    /// Distance in mm at which rays start [default: half a step]
-    #[arg(long, value_name = "O", allow_negative_numbers = true)]
+    /// Distance from the voxel's centre in mm at which they start [default: half a step]
+    #[arg(long, value_name = "O", value_parser = length, allow_hyphen_values = true)]
     pub offset_mm: Option<f32>,
-    /// Distance in mm between samples [default: the smallest spacing]
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    /// Distance in mm between their samples [default: the smallest spacing]
+    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
-    /// lao computes everything again, cao only what a clip changed
-    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s))]
-    pub method: Option<Method>,
 }
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
 #[derive(Args)]
+#[command(next_help_heading = "Clips (every --clip-… belongs to the last --clip before it)")]
 pub struct Clips {
-    /// Clip with plane, box, sphere, cylinder, cone, torus or a mesh file.obj; may be given several times
+    /// Clip with plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; up to 8 times
     #[arg(long, value_name = "SHAPE|MESH.obj")]
     pub clip: Vec<String>,
-    /// remove: the inside disappears; keep: the outside
+    /// What disappears. remove: the inside; keep: the outside [default: remove]
     #[arg(long, value_name = "remove|keep", value_parser = |s: &str| Mode::parse(s))]
     pub clip_mode: Vec<Mode>,
     /// Move by mm from the volume's centre
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<f32>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = translation, allow_hyphen_values = true)]
     pub clip_translate: Vec<[f32; 3]>,
     /// Turn by degrees about x, then y, then z
-    #[arg(long, value_name = "RX,RY,RZ", value_parser = triple::<f32>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "RX,RY,RZ", value_parser = rotation, allow_hyphen_values = true)]
     pub clip_rotate: Vec<[f32; 3]>,
-    /// Scale the shape, whose radius or half-edge is 1 mm
-    #[arg(long, value_name = "S|SX,SY,SZ", value_parser = one_or_three)]
+    /// Scale the shape, whose radius or half-edge is 1 mm; a mesh has the file's size in mm
+    #[arg(long, value_name = "S|SX,SY,SZ", value_parser = scale, allow_hyphen_values = true)]
     pub clip_scale: Vec<[f32; 3]>,
 }
 
@@ -147,29 +175,32 @@ pub struct Render {
     /// Picture of both eyes side by side (PNG)
     #[arg(short, long, value_name = "FILE", required_unless_present = "eyes")]
     pub output: Option<PathBuf>,
-    /// One picture for each eye (PNG)
-    #[arg(long, value_name = "LEFT,RIGHT", value_delimiter = ',', num_args = 2)]
-    pub eyes: Vec<PathBuf>,
+    /// One picture for each eye (PNG); instead of -o or beside it
+    #[arg(long, value_name = "LEFT,RIGHT", value_parser = pair)]
+    pub eyes: Option<[PathBuf; 2]>,
     /// Pixels of one eye [default: 1024x1024]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
-    /// Look from this side: degrees about +z, from -y
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    /// Look from this side: degrees about +z, from -y [default: 30]
+    #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
     pub azimuth: Option<f32>,
-    /// Look from this height: degrees above the xy plane
-    #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
+    /// Look from this height: -90 to 90 degrees above the xy plane [default: 25]
+    #[arg(long, value_name = "DEG", value_parser = elevation, allow_hyphen_values = true)]
     pub elevation: Option<f32>,
     /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", value_parser = positive, allow_hyphen_values = true)]
     pub distance: Option<f32>,
-    /// Distance between the eyes in mm
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    /// Distance between the eyes in mm [default: 1/15 of that distance, at most 63]
+    #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
     /// Draw without ambient occlusion
     #[arg(long)]
     pub solid: bool,
     #[command(flatten)]
     pub settings: Settings,
+    /// cao computes only what the clips change; lao everything, for comparison [default: cao]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    pub method: Option<Method>,
     #[command(flatten)]
     pub clips: Clips,
     #[command(flatten)]
@@ -180,20 +211,23 @@ pub struct Render {
 pub struct Occlusion {
     /// Volume file or builtin:NAME:SIZE
     pub input: String,
-    /// Ambient volume (f32 NRRD, x fastest, the input's spacing)
+    /// Ambient volume (NRRD of f32, x fastest, the input's spacing)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Also write the clipped opacity (f32 NRRD)
+    /// Also write the clipped opacity (NRRD of f32)
     #[arg(long, value_name = "FILE")]
     pub opacity_out: Option<PathBuf>,
-    /// Also write the mask: 0 clipped, 0.5 recomputed, 1 untouched (f32 NRRD)
+    /// Also write the mask (NRRD of f32): 0 clipped away, 0.5 near a clip, recomputed, 1 untouched
     #[arg(long, value_name = "FILE")]
     pub mask_out: Option<PathBuf>,
-    /// Compute only voxels that a sample with opacity can touch; the others hold 1
-    #[arg(long)]
-    pub needed_only: bool,
     #[command(flatten)]
     pub settings: Settings,
+    /// lao computes everything; cao first without clips, then only what the clips change [default: lao]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    pub method: Option<Method>,
+    /// Compute only voxels that a sample with opacity can touch; the others hold 1
+    #[arg(long, help_heading = "Occlusion")]
+    pub needed_only: bool,
     #[command(flatten)]
     pub clips: Clips,
     #[command(flatten)]
@@ -206,12 +240,12 @@ pub struct Verify {
     #[arg(default_value = "built-in")]
     pub input: String,
     /// Random poses of every shape
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub poses: u32,
     /// Seed of the poses
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
-    /// Shapes to try, meshes too [default: the six analytic ones]
+    /// Shapes to clip with, meshes too [default: plane,box,sphere,cylinder,cone,torus]
     #[arg(long, value_name = "SHAPE,...", value_delimiter = ',')]
     pub shapes: Vec<String>,
     /// Compare every voxel, not only those that a sample with opacity can touch
@@ -232,19 +266,33 @@ pub struct Info {
 }
 
 impl Raw {
+    /// What the user means by the name of a volume.
+    pub fn source(&self, input: &str) -> Result<VolumeSource> {
+        let source = VolumeSource::parse(input);
+        match (self.dims, &self.kind, source) {
+            (Some(dims), Some(kind), VolumeSource::File(path)) => Ok(VolumeSource::Raw {
+                path,
+                dims,
+                kind: kind.clone(),
+                spacing_mm: self.spacing.unwrap_or([1.0; 3]),
+                big_endian: self.endian == Some(Endian::Big),
+            }),
+            (Some(_), ..) => Err(usage(format!("--dims: {input} has dimensions of its own"))),
+            (None, _, source) => Ok(source),
+        }
+    }
+
     /// Opens a volume by the name that the user gave.
     pub fn open(&self, input: &str) -> Result<Volume> {
-        match (self.dims, &self.kind) {
-            (None, _) => Ok(volume::open(input)?),
-            (Some(_), None) => bail!("--dims needs --type, the type of the values, such as --type uint8"),
-            (Some(dims), Some(kind)) => {
-                let Some(endian) = Endian::parse(&self.endian) else {
-                    bail!("--endian {}: expected little or big", self.endian);
-                };
-                let spacing = self.spacing.unwrap_or([1.0; 3]);
-                Ok(volume::read_raw(Path::new(input), dims, kind, endian, spacing)?)
-            }
-        }
+        open(&self.source(input)?, input)
+    }
+}
+
+/// Opens a volume; errors name `input`, also where the library knows of no file.
+pub fn open(source: &VolumeSource, input: &str) -> Result<Volume> {
+    match source.open() {
+        Err(error @ cao::Error::Config { .. }) => Err(error).with_context(|| input.to_owned()),
+        other => Ok(other?),
     }
 }
 
@@ -254,35 +302,53 @@ pub fn shape(name: &str) -> Result<Shape> {
         let mesh = TriangleMesh::load_obj(Path::new(name))?.outward()?;
         return Ok(Shape::Mesh(Arc::new(mesh)));
     }
-    Ok(Shape::parse(name)?)
+    Shape::parse(name).map_err(|error| usage(error.to_string()))
 }
 
 /// The clips in the order given: each --clip-* belongs to the last --clip before it.
 pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
     let places = |id: &str| matches.indices_of(id).into_iter().flatten().collect::<Vec<_>>();
     let starts = places("clip");
-    let mut clips = Vec::new();
-    for name in matches.get_many::<String>("clip").into_iter().flatten() {
-        clips.push(Clip { shape: shape(name)?, mode: Mode::Remove, pose: Pose::default() });
+    if starts.len() > Clip::MAX {
+        return Err(usage(format!("--clip is given {} times; expected at most {}", starts.len(), Clip::MAX)));
     }
-    // Number of the clip that the i-th value of a flag belongs to.
-    let owner = |flag: &str, place: usize| match starts.iter().rposition(|&start| start < place) {
-        Some(clip) => Ok(clip),
-        None => bail!("--{} stands before any --clip; give the shape first", flag.replace('_', "-")),
-    };
-    for (place, mode) in places("clip_mode").into_iter().zip(values::<Mode>(matches, "clip_mode")) {
-        clips[owner("clip_mode", place)?].mode = mode;
-    }
-    type Set = fn(&mut Pose, Vec3);
-    let flags: [(&str, Set); 3] = [
-        ("clip_translate", |pose, v| pose.translate_mm = v),
-        ("clip_rotate", |pose, v| pose.rotate_deg = v),
-        ("clip_scale", |pose, v| pose.scale = v),
-    ];
-    for (flag, set) in flags {
-        for (place, value) in places(flag).into_iter().zip(values::<[f32; 3]>(matches, flag)) {
-            set(&mut clips[owner(flag, place)?].pose, Vec3::from_array(value));
+    // For each value of a flag the number of the clip that it belongs to.
+    let owners = |id: &str| -> Result<Vec<usize>> {
+        let flag = id.replace('_', "-");
+        let mut owners = Vec::new();
+        for place in places(id) {
+            let Some(clip) = starts.iter().rposition(|&start| start < place) else {
+                return Err(usage(format!("--{flag} stands before any --clip; give the shape first")));
+            };
+            if owners.last() == Some(&clip) {
+                return Err(usage(format!("--{flag} is given twice for the same --clip; expected once")));
+            }
+            owners.push(clip);
         }
+        Ok(owners)
+    };
+    // Mistakes in the order of flags are found before a mesh is read.
+    let modes = owners("clip_mode")?;
+    let translations = owners("clip_translate")?;
+    let rotations = owners("clip_rotate")?;
+    let scales = owners("clip_scale")?;
+
+    let mut clips = Vec::new();
+    for name in values::<String>(matches, "clip") {
+        clips.push(Clip::remove(shape(&name)?));
+    }
+    for (clip, mode) in modes.into_iter().zip(values(matches, "clip_mode")) {
+        clips[clip].mode = mode;
+    }
+    let vectors = |id| values::<[f32; 3]>(matches, id).into_iter().map(Vec3::from_array);
+    for (clip, mm) in translations.into_iter().zip(vectors("clip_translate")) {
+        clips[clip].pose.translate_mm = mm;
+    }
+    for (clip, degrees) in rotations.into_iter().zip(vectors("clip_rotate")) {
+        clips[clip].pose.rotate_deg = degrees;
+    }
+    for (clip, factors) in scales.into_iter().zip(vectors("clip_scale")) {
+        clips[clip].pose.scale = factors;
     }
     Ok(clips)
 }
@@ -291,18 +357,71 @@ fn values<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, flag: &str) ->
     matches.get_many::<T>(flag).into_iter().flatten().cloned().collect()
 }
 
-fn triple<T: std::str::FromStr>(text: &str) -> Result<[T; 3], String> {
-    let parts: Vec<T> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    match <[T; 3]>::try_from(parts) {
-        Ok(triple) if text.split(',').count() == 3 => Ok(triple),
-        _ => Err("expected three numbers, X,Y,Z".into()),
-    }
+fn three<T: FromStr>(text: &str, separators: &[char]) -> Option<[T; 3]> {
+    let parts: Option<Vec<T>> = text.split(separators).map(|part| part.trim().parse().ok()).collect();
+    parts?.try_into().ok()
 }
 
-fn one_or_three(text: &str) -> Result<[f32; 3], String> {
-    match text.parse::<f32>() {
-        Ok(scale) => Ok([scale; 3]),
-        Err(_) => triple(text).map_err(|_| "expected one number or three, SX,SY,SZ".into()),
+fn triple<T: FromStr>(text: &str) -> Result<[T; 3], String> {
+    three(text, &[',']).ok_or_else(|| "expected three numbers, X,Y,Z".into())
+}
+
+fn dims(text: &str) -> Result<[usize; 3], String> {
+    three(text, &[',', 'x']).ok_or_else(|| "expected three whole numbers, X,Y,Z".into())
+}
+
+fn endian(text: &str) -> Result<Endian, String> {
+    Endian::parse(text).ok_or_else(|| "expected little or big".into())
+}
+
+/// Refuses what no pose can have.
+fn posed(value: [f32; 3], set: impl Fn(&mut Pose, Vec3)) -> Result<[f32; 3], String> {
+    let mut pose = Pose::default();
+    set(&mut pose, Vec3::from_array(value));
+    pose.check().map(|()| value).map_err(|error| error.to_string())
+}
+
+fn translation(text: &str) -> Result<[f32; 3], String> {
+    posed(triple(text)?, |pose, mm| pose.translate_mm = mm)
+}
+
+fn rotation(text: &str) -> Result<[f32; 3], String> {
+    posed(triple(text)?, |pose, degrees| pose.rotate_deg = degrees)
+}
+
+fn scale(text: &str) -> Result<[f32; 3], String> {
+    let factors = match text.parse::<f32>() {
+        Ok(factor) => [factor; 3],
+        Err(_) => three(text, &[',']).ok_or("expected one number or three, SX,SY,SZ")?,
+    };
+    posed(factors, |pose, factors| pose.scale = factors)
+}
+
+fn number(text: &str, expected: impl Display, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
+    let number = text.parse().ok().filter(|n: &f32| n.is_finite() && fits(*n));
+    number.ok_or_else(|| format!("expected {expected}"))
+}
+
+fn length(text: &str) -> Result<f32, String> {
+    number(text, "a length >= 0 mm", |mm| mm >= 0.0)
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    number(text, "a length > 0 mm", |mm| mm > 0.0)
+}
+
+fn angle(text: &str) -> Result<f32, String> {
+    number(text, "an angle in degrees", |_| true)
+}
+
+fn elevation(text: &str) -> Result<f32, String> {
+    number(text, "an angle from -90 to 90 degrees", |degrees| degrees.abs() <= 90.0)
+}
+
+fn pair(text: &str) -> Result<[PathBuf; 2], String> {
+    match text.split_once(',') {
+        Some((left, right)) if !left.is_empty() && !right.is_empty() => Ok([left.into(), right.into()]),
+        _ => Err("expected two files, LEFT,RIGHT".into()),
     }
 }
 

@@ -16,9 +16,16 @@ pub fn run(global: &Global) -> Result<ExitCode> {
             out.line(format!("   cannot be used: {lacking}"));
         }
     }
-    let json = devices
-        .iter()
-        .map(|d| serde_json::json!({ "name": d.name, "driver": d.driver, "missing": d.missing }));
+    let json = devices.iter().enumerate().map(|(index, d)| {
+        serde_json::json!({
+            "index": index,
+            "name": d.name,
+            "driver": d.driver,
+            "api_version": d.api_version,
+            "usable": d.missing.is_empty(),
+            "missing": d.missing,
+        })
+    });
     out.json(serde_json::json!({ "devices": json.collect::<Vec<_>>() }));
     out.finish()?;
     Ok(ExitCode::SUCCESS)

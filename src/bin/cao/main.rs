@@ -11,8 +11,10 @@ mod verify;
 use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
 
+/// Exit code for a wrong command line, as clap's own.
+const USAGE: u8 = 2;
+
 fn main() -> ExitCode {
-    // Usage errors exit with 2 inside clap.
     let matches = args::Cli::command().get_matches();
     let cli = match args::Cli::from_arg_matches(&matches) {
         Ok(cli) => cli,
@@ -23,7 +25,7 @@ fn main() -> ExitCode {
     let outcome = match &cli.command {
         args::Command::Render(a) => render::run(&cli.global, a, of_command),
         args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
-        args::Command::Verify(a) => verify::run(&cli.global, a, of_command),
+        args::Command::Verify(a) => verify::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };
@@ -31,7 +33,10 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             eprintln!("cao: {error:#}");
-            ExitCode::FAILURE
+            match error.is::<args::Usage>() {
+                true => ExitCode::from(USAGE),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }

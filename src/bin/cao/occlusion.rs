@@ -1,7 +1,7 @@
 //! `cao occlusion`: the ambient volume of a volume, as a file.
 
 use crate::args::{self, Global, Occlusion};
-use crate::output::{Out, Progress, check_validation, open_gpu};
+use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer, Setup};
 use cao::scene::Method;
@@ -9,22 +9,33 @@ use cao::stage::lao::Scope;
 use cao::transfer::TransferFunction;
 use cao::volume::{Volume, write_nrrd};
 use clap::ArgMatches;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<ExitCode> {
+    let also = [&args.opacity_out, &args.mask_out];
+    let targets: Vec<&Path> =
+        [&args.output].into_iter().chain(also.into_iter().flatten()).map(PathBuf::as_path).collect();
+    let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
+    let inputs =
+        [args.input.as_str(), transfer].into_iter().chain(args.clips.clip.iter().map(String::as_str));
+    check_targets(&targets, "nrrd", inputs.map(Path::new))?;
+    let mut progress = Progress::new();
     let clips = args::clips(matches)?;
+    progress.stage("reading");
     let volume = args.raw.open(&args.input)?;
-    let setup = setup(&args.settings, &volume, Method::Lao, !args.needed_only)?;
-    let transfer =
-        TransferFunction::load(args.settings.transfer.as_deref().unwrap_or("auto"), volume.range())?;
+    let method = args.method.unwrap_or(Method::Lao);
+    let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    let transfer = TransferFunction::load(transfer, volume.range())?;
+    progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&clips)?;
-    let mut progress = Progress::new("occlusion");
+    progress.stage("occlusion");
     let timings = renderer.update(&mut |done| progress.set(done))?;
-    drop(progress);
     check_validation(&gpu)?;
 
+    progress.stage("writing");
     write_nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
     if let Some(path) = &args.opacity_out {
         write_nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
@@ -33,15 +44,17 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
         let mask: Vec<f32> = renderer.read_mask()?.into_iter().map(|m| f32::from(m) / 2.0).collect();
         write_nrrd(path, &volume, &mask, "mask: 0 clipped, 0.5 affected, 1 untouched")?;
     }
+    let categories = renderer.categories()?;
+    drop(progress);
 
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
     out.setup(&setup, &volume);
-    out.categories(&renderer.categories()?);
+    out.categories(&categories);
     out.timings(&timings);
-    out.wrote(&args.output);
-    for path in [&args.opacity_out, &args.mask_out].into_iter().flatten() {
+    out.memory(&gpu, &volume);
+    for path in targets {
         out.wrote(path);
     }
     out.finish()?;
@@ -51,7 +64,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
 /// The settings that the flags ask for; the paper's where they say nothing.
 pub fn setup(settings: &args::Settings, volume: &Volume, method: Method, all: bool) -> Result<Setup> {
     let mut setup = Setup::paper(volume.min_spacing());
-    setup.method = settings.method.unwrap_or(method);
+    setup.method = method;
     setup.scope = if all { Scope::All } else { Scope::Needed };
     let occlusion = &mut setup.occlusion;
     occlusion.rays = settings.rays.unwrap_or(occlusion.rays);

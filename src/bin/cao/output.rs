@@ -1,16 +1,18 @@
 //! What the program prints: text for people, one JSON object for machines, progress on a terminal only.
 
-use crate::args::Global;
-use anyhow::{Context, Result};
+use crate::args::{Global, usage};
+use anyhow::{Context, Result, bail};
 use cao::gpu::{Gpu, OpenOptions};
 use cao::renderer::{Categories, Setup};
 use cao::scene::Method;
 use cao::volume::Volume;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
+use std::fs::OpenOptions as FileOptions;
 use std::io::Write;
-use std::path::Path;
-use std::time::{Duration, Instant};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
 
 /// Gathers the answer and prints it once.
 pub struct Out {
@@ -76,6 +78,12 @@ impl Out {
         }));
     }
 
+    /// Size of the picture.
+    pub fn image(&mut self, [width, height]: [u32; 2]) {
+        self.line(format!("image     {width} x {height} pixels for each eye"));
+        self.json(json!({ "image_size": [width, height] }));
+    }
+
     /// Voxels of each category.
     pub fn categories(&mut self, c: &Categories) {
         let all = f64::from(c.clipped) + f64::from(c.affected) + f64::from(c.untouched);
@@ -97,13 +105,13 @@ impl Out {
             "memory    {:.1} MiB at peak, {per_voxel:.1} bytes a voxel",
             peak as f64 / 1048576.0
         ));
-        self.json(json!({ "memory_peak_bytes": peak }));
+        self.json(json!({ "memory_peak_bytes": peak, "memory_bytes_per_voxel": per_voxel }));
     }
 
     /// A file that was written.
     pub fn wrote(&mut self, path: &Path) {
         self.line(format!("wrote     {}", path.display()));
-        let files = self.fields.entry("wrote").or_insert_with(|| json!([]));
+        let files = self.fields.entry("files").or_insert_with(|| json!([]));
         if let Value::Array(files) = files {
             files.push(path.display().to_string().into());
         }
@@ -139,35 +147,100 @@ pub fn check_validation(gpu: &Gpu) -> Result<()> {
     Ok(gpu.assert_clean()?)
 }
 
-/// A progress bar on a terminal for whatever takes longer than a second; nothing in a pipe.
+/// Refuses files that could not be written in the end, or that would replace an input or one another, before anything
+/// long begins.
+pub fn check_targets<'a>(
+    targets: &[&Path],
+    extension: &str,
+    inputs: impl Iterator<Item = &'a Path>,
+) -> Result<()> {
+    let inputs: Vec<PathBuf> = inputs.filter_map(|input| input.canonicalize().ok()).collect();
+    let mut taken = Vec::new();
+    for target in targets {
+        let shown = target.display();
+        let Some(name) = target.file_name() else {
+            return Err(usage(format!("{shown}: expected the name of a file to write")));
+        };
+        if target.extension().is_some_and(|found| !found.eq_ignore_ascii_case(extension)) {
+            return Err(usage(format!(
+                "{shown}: expected a name that ends in .{extension}, the format written"
+            )));
+        }
+        let folder = match target.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let Ok(real_folder) = folder.canonicalize() else {
+            bail!("cannot write {shown}: there is no folder {}", folder.display());
+        };
+        if target.is_dir() {
+            bail!("cannot write {shown}: it is a folder, expected the name of a file");
+        }
+        let real = target.canonicalize().unwrap_or_else(|_| real_folder.join(name));
+        if inputs.contains(&real) {
+            return Err(usage(format!("{shown}: would replace an input; expected another name")));
+        }
+        if taken.contains(&real) {
+            return Err(usage(format!("{shown}: would be written twice; expected different names")));
+        }
+        // Permissions, read-only file systems and quotas are found by trying only.
+        let trial = real_folder.join(format!(".cao-{}.part", std::process::id()));
+        let tried = FileOptions::new().write(true).create_new(true).open(&trial);
+        tried.with_context(|| format!("cannot write {shown}"))?;
+        std::fs::remove_file(&trial).with_context(|| format!("cannot write {shown}"))?;
+        taken.push(real);
+    }
+    Ok(())
+}
+
+/// What goes on, on a terminal, where a stage takes longer than a second; nothing in a pipe.
 pub struct Progress {
-    what: &'static str,
-    start: Instant,
-    bar: Option<ProgressBar>,
+    bar: ProgressBar,
+    /// Tells the thread that waits for the second to pass that the stage is over.
+    stage: Option<mpsc::Sender<()>>,
 }
 
 impl Progress {
-    pub fn new(what: &'static str) -> Self {
-        Self { what, start: Instant::now(), bar: None }
+    pub fn new() -> Self {
+        Self { bar: ProgressBar::hidden(), stage: None }
     }
 
-    /// Share done, 0 … 1.
+    /// Begins a stage.
+    pub fn stage(&mut self, what: &'static str) {
+        self.end_stage();
+        let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}");
+        self.bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
+        self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        self.bar.set_message(what);
+        let (sender, ended) = mpsc::channel();
+        self.stage = Some(sender);
+        let bar = self.bar.clone();
+        std::thread::spawn(move || {
+            if ended.recv_timeout(Duration::from_secs(1)) == Err(mpsc::RecvTimeoutError::Timeout) {
+                // Stays hidden where standard error is no terminal.
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.enable_steady_tick(Duration::from_millis(100));
+            }
+        });
+    }
+
+    /// Share of the stage that is done, 0 … 1.
     pub fn set(&mut self, done: f64) {
-        if self.bar.is_none() && self.start.elapsed() > Duration::from_secs(1) {
-            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %  {eta} left")
-                .unwrap_or_else(|_| ProgressStyle::default_bar());
-            self.bar = Some(ProgressBar::new(1000).with_style(style).with_message(self.what));
+        if self.bar.position() == 0 {
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %  {eta} left");
+            self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         }
-        if let Some(bar) = &self.bar {
-            bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
-        }
+        self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
+    }
+
+    fn end_stage(&mut self) {
+        self.stage = None;
+        self.bar.finish_and_clear();
     }
 }
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
+        self.end_stage();
     }
 }

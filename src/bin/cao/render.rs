@@ -1,30 +1,35 @@
 //! `cao render`: a picture for both eyes.
 
-use crate::args::{self, Global, Render};
-use crate::output::{Out, Progress, check_validation, open_gpu};
-use anyhow::{Result, bail};
+use crate::args::{self, Global, Render, usage};
+use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
+use anyhow::Result;
 use cao::picture::Picture;
 use cao::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use cao::scene::{Scene, TransferSource, Viewpoint, VolumeSource};
+use cao::scene::{Scene, Viewpoint};
 use cao::stage::classify::AntiAliasing;
 use cao::stage::clips::MapSettings;
 use cao::stage::eyes::Look;
 use cao::stage::lao::Scope;
 use cao::transfer::TransferFunction;
 use clap::ArgMatches;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitCode> {
+    let targets: Vec<&Path> =
+        args.output.iter().chain(args.eyes.iter().flatten()).map(PathBuf::as_path).collect();
+    check_targets(&targets, "png", inputs(args))?;
+    let mut progress = Progress::new();
+    progress.stage("reading");
     let mut scene = match args.input.to_lowercase().ends_with(".toml") {
+        true if args.raw.dims.is_some() => {
+            return Err(usage(format!("--dims: the scene {} says what its volume is", args.input)));
+        }
         true => Scene::load(Path::new(&args.input))?,
-        false => Scene::default_for(VolumeSource::parse(&args.input)),
+        false => Scene::default_for(args.raw.source(&args.input)?),
     };
     override_scene(&mut scene, args, matches)?;
-    let volume = match args.raw.dims {
-        Some(_) => args.raw.open(&args.input)?,
-        None => scene.volume.open()?,
-    };
+    let volume = args::open(&scene.volume, &args.input)?;
     let transfer = match &args.settings.transfer {
         Some(spec) => TransferFunction::load(spec, volume.range())?,
         None => scene.transfer(volume.range())?,
@@ -50,25 +55,28 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         ..Look::default()
     };
 
+    progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&scene.clips)?;
-    let mut progress = Progress::new("occlusion");
+    progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
-    drop(progress);
+    progress.stage("drawing");
     let (image, draw) = renderer.draw(&views, &look, size)?;
     timings.extend(draw);
     check_validation(&gpu)?;
 
-    let written = write(args, &image, scene.image.background)?;
+    progress.stage("writing");
+    write(args, &image, scene.image.background)?;
+    drop(progress);
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
     out.setup(&setup, &volume);
-    out.line(format!("image     2 x {} x {} pixels", size[0], size[1]));
+    out.image(size);
     out.timings(&timings);
     out.memory(&gpu, &volume);
-    for path in written {
+    for path in targets {
         out.wrote(path);
     }
     out.finish()?;
@@ -81,13 +89,10 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     let o = &mut scene.occlusion;
     o.rays = s.rays.unwrap_or(o.rays);
     o.quadrature = s.quadrature.unwrap_or(o.quadrature);
-    o.method = s.method.unwrap_or(o.method);
+    o.method = args.method.unwrap_or(o.method);
     o.radius_mm = s.radius_mm.or(o.radius_mm);
     o.offset_mm = s.offset_mm.or(o.offset_mm);
     o.step_mm = s.step_mm.or(o.step_mm);
-    if s.transfer.is_some() {
-        scene.transfer = TransferSource::Preset("auto".into());
-    }
     scene.clips.extend(args::clips(matches)?);
     if let Some([width, height]) = args.size {
         (scene.image.width, scene.image.height) = (width, height);
@@ -103,28 +108,26 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
             distance_mm: args.distance.or(distance),
         };
     }
-    if args.distance.is_some_and(|d| !(d > 0.0 && d.is_finite())) {
-        bail!("--distance: expected a length > 0 mm");
-    }
     scene.stereo.ipd_mm = args.ipd.or(scene.stereo.ipd_mm);
     scene.shading.occlusion &= !args.solid;
     Ok(())
 }
 
-fn write<'a>(args: &'a Render, image: &StereoImage, background: [f32; 3]) -> Result<Vec<&'a Path>> {
+fn write(args: &Render, image: &StereoImage, background: [f32; 3]) -> Result<()> {
     let [width, height] = image.size;
-    let [left, right] = &image.colour;
-    let (left, right) =
-        (Picture::over(width, height, left, background), Picture::over(width, height, right, background));
-    let mut written = Vec::new();
+    let [left, right] = image.colour.each_ref().map(|eye| Picture::over(width, height, eye, background));
     if let Some(path) = &args.output {
         Picture::beside(&left, &right).write_png(path)?;
-        written.push(path.as_path());
     }
-    if let [left_path, right_path] = args.eyes.as_slice() {
+    if let Some([left_path, right_path]) = &args.eyes {
         left.write_png(left_path)?;
         right.write_png(right_path)?;
-        written.extend([left_path.as_path(), right_path.as_path()]);
     }
-    Ok(written)
+    Ok(())
+}
+
+/// Files that must not be overwritten.
+fn inputs(args: &Render) -> impl Iterator<Item = &Path> {
+    let given = [Some(&args.input), args.settings.transfer.as_ref()].into_iter().flatten();
+    given.chain(&args.clips.clip).map(Path::new)
 }

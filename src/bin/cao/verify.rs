@@ -3,13 +3,12 @@
 use crate::args::{self, Global, Verify};
 use crate::occlusion::setup;
 use crate::output::{Out, Progress, check_validation, open_gpu};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use cao::clip::Shape;
 use cao::measure::exactness::{Plan, Report, verify};
 use cao::renderer::{COLOUR, Renderer};
 use cao::scene::Method;
 use cao::transfer::TransferFunction;
-use clap::ArgMatches;
 use serde_json::json;
 use std::process::ExitCode;
 
@@ -17,11 +16,8 @@ use std::process::ExitCode;
 const BUILT_IN: [&str; 4] =
     ["builtin:engine:40", "builtin:fruit:32", "builtin:skeleton:40", "builtin:engine:40x36x20:1,1,2"];
 
-pub fn run(global: &Global, args: &Verify, _: &ArgMatches) -> Result<ExitCode> {
-    if args.poses == 0 {
-        bail!("--poses 0 would check nothing; expected at least 1");
-    }
-    let inputs = match args.input.as_str() {
+pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
+    let names = match args.input.as_str() {
         "built-in" => BUILT_IN.to_vec(),
         input => vec![input],
     };
@@ -29,25 +25,34 @@ pub fn run(global: &Global, args: &Verify, _: &ArgMatches) -> Result<ExitCode> {
         true => Shape::ANALYTIC.to_vec(),
         false => args.shapes.iter().map(|name| args::shape(name)).collect::<Result<_>>()?,
     };
+    let mut progress = Progress::new();
+    progress.stage("reading");
+    // All of them before the device works for minutes on the first.
+    let mut inputs = Vec::new();
+    for name in names {
+        let volume = args.raw.open(name)?;
+        let setup = setup(&args.settings, &volume, Method::Cao, args.all_voxels)?;
+        let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
+        let transfer = TransferFunction::load(transfer, volume.range())?;
+        inputs.push((name, volume, setup, transfer));
+    }
+    progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut out = Out::new(global);
     out.device(&gpu);
     let mut exact = true;
     let mut reports = Vec::new();
-    for input in inputs {
-        let volume = args.raw.open(input)?;
-        let setup = setup(&args.settings, &volume, Method::Cao, args.all_voxels)?;
-        let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
-        let transfer = TransferFunction::load(transfer, volume.range())?;
+    for (input, volume, setup, transfer) in inputs {
+        progress.stage("preparing");
         let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
         let plan = Plan { shapes: shapes.clone(), poses: args.poses, seed: args.seed };
-        let mut progress = Progress::new("verify");
+        progress.stage("verifying");
         let report = verify(&mut renderer, &plan, &mut |done| progress.set(done))?;
-        drop(progress);
         print(&mut out, input, &report, args.seed);
         exact &= report.exact();
         reports.push(as_json(input, &report));
     }
+    drop(progress);
     check_validation(&gpu)?;
     out.line(if exact { "exact: nothing differs" } else { "NOT EXACT: see the lines above" });
     out.json(json!({ "exact": exact, "seed": args.seed, "volumes": reports }));
