@@ -160,12 +160,19 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it.
+    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it. On error
+    /// everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
         setup.occlusion.check(f64::from(self.field.min_spacing()))?;
-        self.setup = setup;
+        let before = std::mem::replace(&mut self.setup, setup);
+        if let Err(error) = self.prepare_clips() {
+            // Maps of one radius under rays of another would leave voxels stale.
+            self.setup = before;
+            self.prepare_clips()?;
+            return Err(error);
+        }
         self.stale = Stale { rays: true, precomputed: true, ambient: true, ..self.stale };
-        self.prepare_clips()
+        Ok(())
     }
 
     /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or has a new scale; moving

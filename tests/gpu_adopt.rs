@@ -4,7 +4,12 @@ mod gpu_support;
 
 use ash::vk;
 use cao::Error;
-use cao::gpu::{Access::*, Adopted, BufferUse, Gpu, ValidationLog};
+use cao::clip::{Clip, Shape};
+use cao::gpu::{Access::*, Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, ValidationLog};
+use cao::renderer::{Renderer, Setup};
+use cao::stage::eyes::Look;
+use cao::transfer::TransferFunction;
+use cao::view::StereoRig;
 use gpu_support::{bind, compile};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -123,6 +128,7 @@ fn a_host_keeps_its_handles_and_its_queue() {
         physical_device: host.physical,
         device: host.device.clone(),
         queue_family: host.family,
+        queue: None,
     };
     // SAFETY: the handles belong together, have what is required, and outlive `gpu`.
     let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
@@ -182,6 +188,71 @@ fn a_host_keeps_its_handles_and_its_queue() {
     // The host goes on.
     let cmd = host.begin();
     host.submit_and_wait(&[cmd]);
+    host.destroy();
+    assert_eq!(*MESSAGES.lock().unwrap(), [] as [&str; 0]);
+}
+
+/// The embedding as the README describes it: the renderer is made with a lent queue, the frame goes into the host's own command
+/// buffer, and the ambient volume is that of a renderer with a device of its own.
+#[test]
+fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
+    let host = Host::new();
+    let adopted = Adopted {
+        entry: host.entry.clone(),
+        instance: host.instance.clone(),
+        physical_device: host.physical,
+        device: host.device.clone(),
+        queue_family: host.family,
+        queue: Some(host.queue),
+    };
+    // SAFETY: the handles belong together, have what is required, and outlive `gpu`; the queue is used by this thread alone.
+    let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
+    let volume = cao::volume::open("builtin:fruit:16").unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let setup = Setup::paper(volume.min_spacing());
+    let clips = [Clip::remove(Shape::Torus)];
+    let renderer = |gpu: &Gpu| {
+        let mut renderer = Renderer::new(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
+        renderer.set_clips(&clips).unwrap();
+        renderer
+    };
+    let mut hosted = renderer(&gpu);
+    let target = |format| {
+        let desc = ImageDesc {
+            dims: [16, 16, 1],
+            layers: 2,
+            format,
+            kind: ImageKind::D2,
+            usage: ImageUse::ATTACHMENT,
+        };
+        gpu.image("swapchain", &desc).unwrap()
+    };
+    let (colour, depth) = (target(Format::Rgba16Float), target(Format::D32Float));
+    let views = StereoRig::framing(volume.size_mm(), 30.0, 20.0).views(1.0, 1.0, 500.0).unwrap();
+
+    let cmd = host.begin();
+    // SAFETY: the command buffer is recording and submitted once below; the `Recorded` is kept until then.
+    let mut rec = unsafe { gpu.record_into(cmd) };
+    hosted.record_update(&mut rec).unwrap();
+    rec.discard(&colour);
+    rec.discard(&depth);
+    rec.barrier(&[], &[AttachmentWrite]);
+    hosted.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, [16, 16]).unwrap();
+    let recorded = rec.finish().unwrap();
+    host.submit_and_wait(&[cmd]);
+    let stages = recorded.timings().unwrap().expect("the host has waited");
+    assert!(stages.iter().any(|(name, _)| name == "raycast"), "{stages:?}");
+
+    let own_gpu = gpu_support::open();
+    let mut own = renderer(&own_gpu);
+    own.update(&mut |_| ()).unwrap();
+    let bits = |r: &Renderer| r.read_ambient().unwrap().into_iter().map(f32::to_bits).collect::<Vec<_>>();
+    assert_eq!(bits(&hosted), bits(&own));
+
+    drop((own, hosted, colour, depth, recorded));
+    gpu_support::close(own_gpu);
+    assert_eq!(gpu.memory_report(), []);
+    drop(gpu);
     host.destroy();
     assert_eq!(*MESSAGES.lock().unwrap(), [] as [&str; 0]);
 }

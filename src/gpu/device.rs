@@ -43,6 +43,9 @@ pub struct Adopted {
     pub device: ash::Device,
     /// Family of the queue that will run the recorded commands; must do graphics and compute.
     pub queue_family: u32,
+    /// A queue of that family lent to the calls that say they use one (uploads, read-backs, new clip meshes): during such a call
+    /// nobody else may use it. `None`: those calls refuse, and recording into the host's command buffers is all there is.
+    pub queue: Option<vk::Queue>,
 }
 
 /// What everything made with a [`Gpu`] shares.
@@ -231,12 +234,13 @@ impl Gpu {
         Ok((physical, info.clone(), device.map_err(vulkan("vkCreateDevice", &info.name))?, family))
     }
 
-    /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers; nothing here submits, waits or
-    /// touches a queue, and [`Gpu::recorder`] refuses.
+    /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers and nothing submits or waits, except
+    /// calls that say so, on the queue that the host lent; without one, [`Gpu::recorder`] refuses.
     ///
     /// # Safety
     /// The handles must be valid and belong together, be made with Vulkan 1.3 or newer and with [`Gpu::required_extensions`] and
-    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped.
+    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped. A lent queue must not be used by others during calls that
+    /// use it.
     ///
     /// # Errors
     /// [`Error::Device`] if the physical device lacks something that is needed.
@@ -250,7 +254,7 @@ impl Gpu {
             info,
             device: host.device,
             family: host.queue_family,
-            queue: None,
+            queue: host.queue,
             debug: false,
             log: ValidationLog::default(),
         };

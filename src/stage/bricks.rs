@@ -73,7 +73,10 @@ impl Bricks {
         changed_before: &Buffer,
         list: &BrickList,
     ) -> Result<()> {
-        rec.barrier(&[Access::IndirectRead, Access::StorageRead], &[Access::TransferWrite]);
+        rec.barrier(
+            &[Access::IndirectRead, Access::StorageRead],
+            &[Access::TransferWrite, Access::StorageWrite],
+        );
         rec.update(&list.buffer, 0, bytemuck::bytes_of(&[0_u32, 0, 1, 0]))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let params = Params { dims: field.dims, mode: which as u32, bricks: field.bricks(), pad: 0 };

@@ -189,9 +189,10 @@ impl ClipSet {
             peeled.push(match found {
                 Some(index) => self.peeled.swap_remove(index),
                 None => {
-                    mesh.closed()?;
-                    let camera = ClipCamera::around(mesh, scale, radius, settings.resolution);
-                    let layers = peel.run(gpu, mesh, scale, camera, settings.pairs)?;
+                    // Front and back layers have their meaning only where faces look outward.
+                    let solid = mesh.outward()?;
+                    let camera = ClipCamera::around(&solid, scale, radius, settings.resolution);
+                    let layers = peel.run(gpu, &solid, scale, camera, settings.pairs)?;
                     timings.push(("peel".into(), layers.milliseconds));
                     Peeled { mesh: mesh.clone(), scale, margin: radius, settings, layers }
                 }
