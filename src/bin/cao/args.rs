@@ -243,7 +243,7 @@ pub struct Verify {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub poses: u32,
     /// Seed of the poses
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, allow_hyphen_values = true)]
     pub seed: u64,
     /// Shapes to clip with, meshes too [default: plane,box,sphere,cylinder,cone,torus]
     #[arg(long, value_name = "SHAPE,...", value_delimiter = ',')]
