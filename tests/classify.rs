@@ -74,9 +74,7 @@ impl<'a> Bench<'a> {
             rec.fill(count, 0, count.bytes(), 0).unwrap();
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
             let literal = maps.literal;
-            self.classify
-                .record(rec, &field, &set, samples, reach, literal, &full, &opacity, &mask)
-                .unwrap();
+            self.classify.record(rec, &field, &set, samples, reach, literal, &full, &opacity, &mask).unwrap();
         });
         Found {
             opacity: read_floats(gpu, &opacity),
@@ -165,7 +163,6 @@ fn possible(grid: &Grid, voxel: [usize; 3], clips: &[ClipField], positions: &[[f
 }
 
 /// Compares; returns how many voxels are so near to a surface that either side is right.
-#[expect(clippy::too_many_arguments, reason = "what was run, and what came out")]
 fn compare(
     grid: &Grid,
     full: &[f32],

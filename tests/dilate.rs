@@ -99,18 +99,12 @@ fn each_pair_is_dilated_as_the_twin_does_it() {
                         // a mesh, which is empty itself.
                         let cell_mm = map_mm / cells as f32;
                         let border = if keep { (radius / cell_mm) as u32 + 1 } else { 0 };
-                        let clip = MeshClip {
-                            camera,
-                            pairs,
-                            cells,
-                            layers_at: 5,
-                            dilation_at: 3,
-                            keep,
-                            literal,
-                        };
+                        let clip =
+                            MeshClip { camera, pairs, cells, layers_at: 5, dilation_at: 3, keep, literal };
                         let found = on_device(&gpu, &kernel, &clip, radius, &layers);
-                        let context =
-                            format!("{resolution}/{cells} pairs {pairs} keep {keep} literal {literal} radius {radius}");
+                        let context = format!(
+                            "{resolution}/{cells} pairs {pairs} keep {keep} literal {literal} radius {radius}"
+                        );
                         let tolerance = DEPTH_ROUNDING + HEIGHT_ROUNDING * radius / camera.depth_mm;
                         for pair in 0..pairs {
                             let layers = pair_of(&layers, camera, pair);
@@ -207,7 +201,8 @@ fn no_point_within_the_radius_is_missed() {
                 assert!(inside(&layers, resolution, q), "{}", context());
                 kept += 1;
             } else if !keep && inside(&layers, resolution, p) {
-                let on_map = (0.0..resolution as f32).contains(&q.x) && (0.0..resolution as f32).contains(&q.y);
+                let on_map =
+                    (0.0..resolution as f32).contains(&q.x) && (0.0..resolution as f32).contains(&q.y);
                 assert!(!on_map || inside(&maps, cells, q), "{}", context());
                 tested += 1;
             }

@@ -140,7 +140,8 @@ fn every_ray_set_and_rule_at_every_length_and_size() {
                 for _ in 0..if g == 3 { LENGTHS.len() } else { 2 } {
                     let (occlusion, reference_mm) = occlusion(rays, quadrature, turn, grid.min_spacing());
                     turn += 1;
-                    let settings = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
+                    let settings =
+                        Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
                     let expected = cpu::lao::lao(grid, &opacity, &occlusion, reference_mm);
                     let tolerance = tolerance(&gpu, grid, &occlusion, reference_mm, LARGEST.into());
                     let context = format!("{occlusion:?}");
@@ -223,8 +224,8 @@ fn needed_voxels_have_the_same_bits_and_the_others_one() {
             let every = bench.run(&image, &all);
             let needed = bench.run(&image, &Settings { scope: Scope::Needed, ..all });
             for i in 0..grid.len() {
-                let near = opacity[i] > 0.0
-                    || grid.neighbours(grid.voxel(i)).any(|n| opacity[grid.index(n)] > 0.0);
+                let near =
+                    opacity[i] > 0.0 || grid.neighbours(grid.voxel(i)).any(|n| opacity[grid.index(n)] > 0.0);
                 let expected = if near { every[i] } else { 1.0 };
                 assert_eq!(needed[i].to_bits(), expected.to_bits(), "{:?} {:?}", grid.dims, grid.voxel(i));
             }

@@ -73,7 +73,10 @@ fn compare(gpu: &Gpu, peel: &Peel, mesh: &TriangleMesh, scale: Vec3, resolution:
                     let steepest = steps.into_iter().fold(0.0, f32::max);
                     let tolerance = DEPTH_ROUNDING + SNAP_PIXELS * steepest;
                     if (f - e).abs() > tolerance {
-                        assert!(outline, "{context}: layer {k} pixel ({x}, {y}) is {f}, not {e} ± {tolerance:e}");
+                        assert!(
+                            outline,
+                            "{context}: layer {k} pixel ({x}, {y}) is {f}, not {e} ± {tolerance:e}"
+                        );
                         differ += 1;
                     }
                 }
@@ -118,11 +121,13 @@ fn closed_meshes_are_never_taken_for_open() {
     let gpu = open();
     let peel = Peel::new(&gpu).unwrap();
     let mut random = Random::new(SEED);
-    let meshes = [TriangleMesh::sphere(3), TriangleMesh::torus(40, 24), TriangleMesh::cuboid(), row_of_boxes(2)];
+    let meshes =
+        [TriangleMesh::sphere(3), TriangleMesh::torus(40, 24), TriangleMesh::cuboid(), row_of_boxes(2)];
     for turn in 0..48 {
         let mut mesh = meshes[turn % meshes.len()].clone();
         let mut angle = || random.between(-3.2, 3.2);
-        let turned = Quat::from_rotation_z(angle()) * Quat::from_rotation_y(angle()) * Quat::from_rotation_x(angle());
+        let turned =
+            Quat::from_rotation_z(angle()) * Quat::from_rotation_y(angle()) * Quat::from_rotation_x(angle());
         mesh.vertices.iter_mut().for_each(|v| *v = turned * *v);
         let mut scale = || 10.0_f32.powf(random.between(-1.0, 2.0));
         let scale = Vec3::new(scale(), scale(), scale());
