@@ -112,7 +112,8 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
             let low = vec3<f32>(brick) * 8.0;
             let out_low = select((low - start) / along, vec3(3.0e38), brick == vec3(0));
             let out_high = select((low + 8.0 - start) / along, vec3(3.0e38), brick == last_brick);
-            let out = select(out_low, out_high, along > vec3(0.0));
+            // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
+            let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(3.0e38), along == vec3(0.0));
             let t_out = min(out.x, min(out.y, out.z));
             k = max(k + 1.0, ceil((t_out - t_begin) / step - phase));
             continue;
