@@ -149,21 +149,22 @@ fn occlusion_at(voxel: vec3<u32>) -> f32 {
     let per_edge = 1.0 / vec3<f32>(params.dims);
     let start = (vec3<f32>(voxel) + 0.5) * per_edge;
     let scale = params.per_mm * per_edge;
-    var sum = 0.0;
+    // What is missing from 1, so that rounded weights neither dim nor overfill a voxel that nothing occludes.
+    var occluded = 0.0;
     if params.quadrature == LEFT {
         for (var k = 0u; k < params.rays; k++) {
-            sum += rays.ray[k].w * ray_left(start, rays.ray[k].xyz * scale);
+            occluded += rays.ray[k].w * (1.0 - ray_left(start, rays.ray[k].xyz * scale));
         }
     } else if params.quadrature == CELL {
         for (var k = 0u; k < params.rays; k++) {
-            sum += rays.ray[k].w * ray_cell(start, rays.ray[k].xyz * scale);
+            occluded += rays.ray[k].w * (1.0 - ray_cell(start, rays.ray[k].xyz * scale));
         }
     } else {
         for (var k = 0u; k < params.rays; k++) {
-            sum += rays.ray[k].w * ray_segment(start, rays.ray[k].xyz * scale);
+            occluded += rays.ray[k].w * (1.0 - ray_segment(start, rays.ray[k].xyz * scale));
         }
     }
-    return sum;
+    return clamp(1.0 - occluded, 0.0, 1.0);
 }
 
 fn has_opacity_around(voxel: vec3<u32>) -> bool {
