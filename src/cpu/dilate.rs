@@ -43,9 +43,9 @@ impl DilationMap {
 
 /// Radius in mm around a hidden region within which a voxel's ambient value may change (method.md §5): the reach of
 /// its rays, the voxel diagonal over which a sample interpolates, half a diagonal from a voxel's centre to its
-/// clip samples, and a thousandth for rounding.
+/// clip samples, and a hundredth for rounding, of which the 1/512 voxel of a GPU's texture coordinates is the most.
 pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
-    (f64::from(reach_mm) + (1.5 + 1e-3) * grid.diagonal()) as f32
+    (f64::from(reach_mm) + (1.5 + 1e-2) * grid.diagonal()) as f32
 }
 
 /// The conservative map with `resolution` cells along an edge.

@@ -56,9 +56,10 @@ impl Classify {
     }
 
     /// How far in mm a clip's change reaches: the longest ray, the eight voxels that its last sample interpolates, the
-    /// cell that one clip sample stands for, and a thousandth of a voxel for rounding (method.md §5).
+    /// cell that one clip sample stands for, and a hundredth of a voxel for rounding, of which the 1/512 voxel of texture
+    /// coordinates on GPUs is the most (method.md §5).
     pub fn reach(field: &Field, occlusion: &Occlusion) -> f32 {
-        occlusion.reach(f64::from(field.min_spacing())) + (1.5 + 1e-3) * field.diagonal()
+        occlusion.reach(f64::from(field.min_spacing())) + (1.5 + 1e-2) * field.diagonal()
     }
 
     /// Classifies every voxel. `count` must have been cleared.

@@ -34,8 +34,13 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         Some(spec) => TransferFunction::load(spec, volume.range())?,
         None => scene.transfer(volume.range())?,
     };
+    let mut occlusion = scene.occlusion.resolve(volume.min_spacing())?;
+    if !scene.shading.occlusion {
+        // What is not shown is not computed: without a neighbourhood nothing is occluded.
+        occlusion.radius_mm = 0.0;
+    }
     let setup = Setup {
-        occlusion: scene.occlusion.resolve(volume.min_spacing())?,
+        occlusion,
         method: scene.occlusion.method,
         scope: if scene.occlusion.needed_only { Scope::Needed } else { Scope::All },
         anti_aliasing: AntiAliasing::N32,
