@@ -1189,7 +1189,8 @@ fn a_failed_write_leaves_the_old_file_and_nothing_else() {
         matches!(volume::write_nrrd(&nowhere, &like, &[0.0; 30], ""), Err(Error::Io { path, .. }) if path == nowhere)
     );
     let error = volume::write_nrrd(folder.0.path(), &like, &[0.0; 30], "").unwrap_err();
-    assert!(error.to_string().contains("not a regular file"), "{error}");
+    let cause = std::error::Error::source(&error).unwrap().to_string();
+    assert!(cause.contains("not a regular file"), "{error}: {cause}");
     assert_eq!(folder.names(), ["out.nrrd"]);
 }
 

@@ -314,7 +314,7 @@ mod tests {
         assert!(covered > 50 && covered < image.depth.len() - 50, "{covered}");
     }
 
-    /// On the upper face the gradient is along z: colour · ½ · (¼ + ½ · 0.8).
+    /// On the upper face the gradient is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
     #[test]
     fn colour_is_shaded_by_ambient_factor_and_gradient() {
         let view = from_above(30.0);
@@ -326,7 +326,7 @@ mod tests {
                 assert!((found - expected).abs() < 1e-6, "{found} {expected}");
             }
         };
-        check(&scene, 0.5 * (0.25 + 0.5 * 0.8));
+        check(&scene, GAIN as f32 * 0.5 * (0.25 + 0.5 * 0.8));
         scene.shading.occlusion = false;
         check(&scene, 0.25 + 0.5 * 0.8);
         // Opacity that varies nowhere has no surface.
