@@ -53,7 +53,8 @@ fn in_dilation(c: u32, rigid: vec3<f32>) -> bool {
     let keep = clips.clip[c].keep != 0u;
     let resolution = clips.clip[c].dilation_resolution;
     let map = map_of(c, rigid);
-    let cell = vec2<i32>(floor(map.xy * (f32(resolution) / f32(clips.clip[c].resolution))));
+    let cells = clips.clip[c].cells;
+    let cell = vec2<i32>(floor((rigid.xy - cells.xy) * cells.z));
     if any(cell < vec2(0)) || any(cell >= vec2(i32(resolution))) {
         return keep;
     }
@@ -87,7 +88,7 @@ fn in_reach(c: u32, world: vec3<f32>) -> bool {
             distance = local_distance(kind, rigid / clips.clip[c].scale.xyz) * clips.clip[c].scale.w;
         }
     }
-    return select(distance, -distance, clips.clip[c].keep != 0u) <= params.reach;
+    return select(distance, -distance, clips.clip[c].keep != 0u) <= params.reach + clips.clip[c].cells.w;
 }
 
 fn any_in_reach(world: vec3<f32>) -> bool {

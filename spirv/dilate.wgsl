@@ -1,6 +1,6 @@
 // Dilation maps of one mesh clip (CAO section 3.4 step 3, eq. (4)): the Minkowski sum of the depth layers and a sphere.
 //
-// Conservative: the maps stand for cells, not for points. `reduce` takes the hull of each block of pixels; `main` adds
+// Conservative: the maps stand for cells, not for points. `reduce` takes the hull of all pixels that a cell touches; `main` adds
 // the sphere over the distance between cells, max(|dx| - 1, 0), so that every point within `radius` of any point of the
 // layers lies inside. For a kept shape the layers are contracted instead: what remains is inside with its whole
 // neighbourhood. LITERAL is eq. (4) as printed, with distances between pixel centres, at the layers' resolution.
@@ -16,6 +16,9 @@ struct DilateParams {
     cell_mm: f32,
     depth_mm: f32,
     flags: u32,
+    // the maps' corner and cell edge in pixels of the layers
+    first: vec2<f32>,
+    per_cell: f32,
 }
 
 struct Layers {
@@ -38,7 +41,8 @@ var<immediate> params: DilateParams;
 @group(0) @binding(1) var<storage, read_write> blocks: Blocks;
 @group(0) @binding(2) var<storage, read_write> dilation: Dilation;
 
-// Hull of the intervals in a block of pixels (kept shapes: what all of them share). z is the layer pair.
+// Hull of the intervals in the pixels under a cell (kept shapes: what all of them share, and nothing where the cell reaches
+// beyond the layers). z is the layer pair.
 @compute @workgroup_size(8, 8, 1)
 fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
     if any(id.xy >= vec2(params.cells)) {
@@ -46,12 +50,18 @@ fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let keep = (params.flags & KEEP) != 0u;
     let size = params.resolution * params.resolution;
-    let block = params.resolution / params.cells;
-    var front = select(1.0, 0.0, keep);
-    var back = select(0.0, 1.0, keep);
-    for (var y = id.y * block; y < (id.y + 1u) * block; y++) {
-        for (var x = id.x * block; x < (id.x + 1u) * block; x++) {
-            let at = params.layers_at + id.z * 2u * size + y * params.resolution + x;
+    // A thousandth of a pixel is more than rounding moves the cell's edges.
+    let corner = params.first + vec2<f32>(id.xy) * params.per_cell;
+    let literal = (params.flags & LITERAL) != 0u;
+    let last = i32(params.resolution) - 1;
+    let low = select(vec2<i32>(floor(corner - 1e-3)), vec2<i32>(id.xy), literal);
+    let high = select(vec2<i32>(floor(corner + params.per_cell + 1e-3)), vec2<i32>(id.xy), literal);
+    let beyond = any(low < vec2(0)) || any(high > vec2(last));
+    var front = select(1.0, 0.0, keep && !beyond);
+    var back = select(0.0, 1.0, keep && !beyond);
+    for (var y = max(low.y, 0); y <= min(high.y, last); y++) {
+        for (var x = max(low.x, 0); x <= min(high.x, last); x++) {
+            let at = params.layers_at + id.z * 2u * size + u32(y) * params.resolution + u32(x);
             let f = layers.depth[at];
             let b = layers.depth[at + size];
             if keep {
@@ -81,12 +91,18 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     // The gap between cells n apart is n - 1 cells, so cells up to radius / cell + 1 apart count.
     let window = i32(ceil(params.radius / params.cell_mm)) + 1;
     let here = vec2<i32>(id.xy);
-    let limit = i32(params.cells) - 1;
+    // Where no pixel of the layers lies there is nothing to add; for a kept shape that is what counts.
+    var nearest = vec2(0);
+    var farthest = vec2(i32(params.cells) - 1);
+    if !keep && !literal {
+        nearest = max(nearest, vec2<i32>(floor(-params.first / params.per_cell)));
+        farthest = min(farthest, vec2<i32>(floor((f32(params.resolution) - params.first) / params.per_cell)));
+    }
     // A kept shape ends at the map's edge at the latest: everything beyond is outside it.
     var front = select(2.0, 0.0, keep);
     var back = select(-1.0, 1.0, keep);
-    for (var y = max(here.y - window, 0); y <= min(here.y + window, limit); y++) {
-        for (var x = max(here.x - window, 0); x <= min(here.x + window, limit); x++) {
+    for (var y = max(here.y - window, nearest.y); y <= min(here.y + window, farthest.y); y++) {
+        for (var x = max(here.x - window, nearest.x); x <= min(here.x + window, farthest.x); x++) {
             let apart = abs(vec2(x, y) - here);
             let gap = vec2<f32>(select(max(apart - 1, vec2(0)), apart, literal)) * params.cell_mm;
             let below = params.radius * params.radius - dot(gap, gap);

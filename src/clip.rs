@@ -180,6 +180,27 @@ impl Clip {
         Some(inside == (self.mode == Mode::Remove))
     }
 
+    /// What rounding of distances in f32 asks for beyond `radius_mm` around what this clip hides, in mm, in a volume whose
+    /// half diagonal is `half_mm`. For a mesh it is a thousandth of the radius where that is enough, else the next power of
+    /// two, so that a mesh that moves rarely needs new maps.
+    pub fn rounding_mm(&self, half_mm: f32, radius_mm: f32) -> f32 {
+        let size = match &self.shape {
+            Shape::Mesh(mesh) => {
+                let (low, high) = mesh.bounds();
+                low.abs().max(high.abs()).max_element()
+            }
+            _ => 1.0,
+        };
+        let extent = self.pose.translate_mm.length() + 2.0 * size * self.pose.scale.max_element() + half_mm;
+        // A handful of operations on numbers of this size, each right to half a unit in the last place.
+        let bound = 16.0 * f32::EPSILON * extent;
+        match self.shape {
+            Shape::Mesh(_) if bound < 1e-3 * radius_mm => 1e-3 * radius_mm,
+            Shape::Mesh(_) => bound.log2().ceil().exp2(),
+            _ => bound,
+        }
+    }
+
     /// A lower bound in mm of the distance from this world point to the region that an analytic clip hides, ≤ 0
     /// inside it; `None` for a mesh. Exact for planes, boxes and uniformly scaled shapes.
     pub fn distance_to_hidden(&self, world: Vec3) -> Option<f32> {
@@ -194,7 +215,7 @@ impl Clip {
 }
 
 /// The orthographic clip camera of a mesh (CAO §3.4 step 2): rigidly attached to the scaled mesh, looking along its
-/// +z, square pixels, with a margin for the dilation.
+/// +z, square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipCamera {
     /// Corner of pixel (0, 0) at depth 0, in the mesh's rigid frame, mm.
@@ -208,19 +229,33 @@ pub struct ClipCamera {
 }
 
 impl ClipCamera {
-    /// The camera of a mesh scaled by `scale`, with `margin_mm` around its bounds.
+    /// The camera of a mesh scaled by `scale`, with `margin_mm` and a pixel around its bounds.
     pub fn around(mesh: &TriangleMesh, scale: Vec3, margin_mm: f32, resolution: u32) -> Self {
         let (low, high) = mesh.bounds();
         let (low, high) = (low * scale - margin_mm, high * scale + margin_mm);
         let size = high - low;
-        // One pixel of border on each side keeps silhouettes off the map's edge.
+        // One pixel of border on each side keeps silhouettes off the map's edge, and faces off its first and last depth.
         let pixel_mm = (size.x.max(size.y) / (resolution - 2) as f32).max(1e-6);
         let centre = (low + high) * 0.5;
         let edge = pixel_mm * resolution as f32;
         Self {
-            corner: Vec3::new(centre.x - edge * 0.5, centre.y - edge * 0.5, low.z),
+            corner: Vec3::new(centre.x - edge * 0.5, centre.y - edge * 0.5, low.z - pixel_mm),
             pixel_mm,
-            depth_mm: size.z.max(1e-6),
+            depth_mm: size.z + 2.0 * pixel_mm,
+            resolution,
+        }
+    }
+
+    /// The camera of this one's dilation maps: `resolution` cells along an edge that leaves `radius_mm` around the map, the
+    /// same depths.
+    pub fn widened(&self, radius_mm: f32, resolution: u32) -> Self {
+        let edge = self.pixel_mm * self.resolution as f32;
+        let cell = (edge + 2.0 * radius_mm) / (resolution - 2) as f32;
+        let shift = 0.5 * (edge - cell * resolution as f32);
+        Self {
+            corner: self.corner + Vec3::new(shift, shift, 0.0),
+            pixel_mm: cell,
+            depth_mm: self.depth_mm,
             resolution,
         }
     }

@@ -191,10 +191,23 @@ impl Renderer {
     fn prepare_clips(&mut self) -> Result<()> {
         let radius = self.map_radius();
         let maps = self.setup.maps;
-        let timings =
-            self.clip_set.prepare(&self.gpu, &self.peel, &self.dilate, &self.clips, radius, maps)?;
+        let timings = self.clip_set.prepare(
+            &self.gpu,
+            &self.peel,
+            &self.dilate,
+            &self.clips,
+            radius,
+            self.half_diagonal(),
+            maps,
+        )?;
         self.prepared.extend(timings);
         Ok(())
+    }
+
+    /// Half the volume's diagonal in mm.
+    fn half_diagonal(&self) -> f32 {
+        let edge = |i: usize| self.field.dims[i] as f32 * self.field.spacing[i];
+        0.5 * Vec3::new(edge(0), edge(1), edge(2)).length()
     }
 
     /// The literal recipe dilates by the ray's length alone.
@@ -320,7 +333,7 @@ impl Renderer {
     }
 
     fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
-        self.clip_set.record(rec, &self.clips)?;
+        self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
         let count = &self.kernels.classify.count;
         rec.barrier(&[Access::TransferRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(count, 0, count.bytes(), 0)?;

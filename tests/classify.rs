@@ -62,7 +62,9 @@ impl<'a> Bench<'a> {
         let reach = Classify::reach(&field, occlusion);
         let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
         let mut set = ClipSet::new(gpu).unwrap();
-        set.prepare(gpu, &self.peel, &self.dilate, clips, radius, maps).unwrap();
+        let half_mm =
+            0.5 * glam::DVec3::from_array(grid.dims.map(|d| d as f64)).length() as f32 * field.diagonal();
+        set.prepare(gpu, &self.peel, &self.dilate, clips, radius, half_mm, maps).unwrap();
         let full = float_image(gpu, &field, full);
         let opacity = volume_image(gpu, "opacity", &field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", &field, Format::R8Uint).unwrap();
@@ -70,7 +72,7 @@ impl<'a> Bench<'a> {
         run(gpu, |rec| {
             rec.discard(&opacity);
             rec.discard(&mask);
-            set.record(rec, clips).unwrap();
+            set.record(rec, clips, half_mm).unwrap();
             rec.fill(count, 0, count.bytes(), 0).unwrap();
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
             let literal = maps.literal;

@@ -61,8 +61,9 @@ fn on_device(gpu: &Gpu, kernel: &Dilate, clip: &MeshClip, radius: f32, layers: &
     // Not at the buffers' beginning, as when other meshes come before.
     let layers = [vec![0.5; clip.layers_at as usize], layers.to_vec()].concat();
     let layers = buffer(gpu, "layers", bytemuck::cast_slice(&layers));
-    let blocks = Dilate::blocks(gpu, clip.cells, clip.pairs).unwrap();
-    let count = clip.dilation_at + 2 * clip.pairs * clip.cells * clip.cells;
+    let cells = clip.cells.resolution;
+    let blocks = Dilate::blocks(gpu, cells, clip.pairs).unwrap();
+    let count = clip.dilation_at + 2 * clip.pairs * cells * cells;
     let maps = gpu.buffer("maps", 4 * u64::from(count), BufferUse::Device).unwrap();
     run(gpu, |rec| kernel.record(rec, clip, radius, &layers, &blocks, &maps).unwrap());
     let all: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &maps));
@@ -73,8 +74,8 @@ fn camera(resolution: u32) -> ClipCamera {
     ClipCamera { corner: Vec3::new(-3.0, 1.0, 0.5), pixel_mm: 0.37, depth_mm: 7.3, resolution }
 }
 
-/// (Z, cells): one cell, one pixel a cell, three, four; one workgroup of 8x8, less, more.
-const SIZES: [(u32, u32); 7] = [(8, 1), (8, 8), (9, 3), (24, 8), (20, 20), (51, 17), (96, 24)];
+/// (Z, cells): cells smaller and larger than pixels; one workgroup of 8x8, more, no multiple of it.
+const SIZES: [(u32, u32); 7] = [(8, 9), (8, 8), (9, 30), (24, 8), (20, 20), (51, 17), (96, 24)];
 
 #[test]
 fn each_pair_is_dilated_as_the_twin_does_it() {
@@ -97,10 +98,17 @@ fn each_pair_is_dilated_as_the_twin_does_it() {
                         let layers = random_layers(&mut random, camera, pairs, keep);
                         // The twin takes what lies beyond the map for empty; the kernel trusts the margin around
                         // a mesh, which is empty itself.
-                        let cell_mm = map_mm / cells as f32;
-                        let border = if keep { (radius / cell_mm) as u32 + 1 } else { 0 };
-                        let clip =
-                            MeshClip { camera, pairs, cells, layers_at: 5, dilation_at: 3, keep, literal };
+                        let wide = if literal { camera } else { camera.widened(radius, cells) };
+                        let border = if keep { (radius / wide.pixel_mm) as u32 + 1 } else { 0 };
+                        let clip = MeshClip {
+                            camera,
+                            pairs,
+                            cells: wide,
+                            layers_at: 5,
+                            dilation_at: 3,
+                            keep,
+                            literal,
+                        };
                         let found = on_device(&gpu, &kernel, &clip, radius, &layers);
                         let context = format!(
                             "{resolution}/{cells} pairs {pairs} keep {keep} literal {literal} radius {radius}"
@@ -165,22 +173,16 @@ fn no_point_within_the_radius_is_missed() {
         let keep = turn % 2 == 1;
         let pairs = 1 + random.below(3) as u32;
         let radius = random.between(0.05, 0.3) * camera.pixel_mm * resolution as f32;
-        let mut layers = random_layers(&mut random, camera, pairs, keep);
-        let size = (resolution * resolution) as usize;
-        // As the clip camera's margin and border do: nothing within the radius of the map's edge.
-        let margin = (radius / camera.pixel_mm).ceil() as u32 + 1;
-        for pixel in 0..size {
-            let (x, y) = (pixel as u32 % resolution, pixel as u32 / resolution);
-            let inner = margin..resolution.saturating_sub(margin);
-            if !inner.contains(&x) || !inner.contains(&y) {
-                layers.iter_mut().skip(pixel).step_by(size).for_each(|z| *z = 1.0);
-            }
-        }
-        let clip = MeshClip { camera, pairs, cells, layers_at: 0, dilation_at: 0, keep, literal: false };
+        let layers = random_layers(&mut random, camera, pairs, keep);
+        let wide = camera.widened(radius, cells);
+        let clip =
+            MeshClip { camera, pairs, cells: wide, layers_at: 0, dilation_at: 0, keep, literal: false };
         let maps = on_device(&gpu, &kernel, &clip, radius, &layers);
-        let inside = |maps: &[f32], edge: u32, p: Vec3| {
-            let block = resolution as f32 / edge as f32;
-            let (x, y) = ((p.x / block).floor(), (p.y / block).floor());
+        // p in pixels and depths of the layers.
+        let inside = |maps: &[f32], of: ClipCamera, p: Vec3| {
+            let scale = Vec3::new(camera.pixel_mm, camera.pixel_mm, camera.depth_mm);
+            let on = of.map(camera.corner + p * scale);
+            let (x, y, edge) = (on.x.floor(), on.y.floor(), of.resolution);
             let on_map = (0.0..edge as f32).contains(&x) && (0.0..edge as f32).contains(&y);
             on_map
                 && (0..pairs as usize).any(|pair| {
@@ -197,13 +199,11 @@ fn no_point_within_the_radius_is_missed() {
             let scale = Vec3::new(camera.pixel_mm, camera.pixel_mm, camera.depth_mm);
             let q = p + moved / scale;
             let context = || format!("seed {SEED} turn {turn}: {p} to {q}");
-            if keep && inside(&maps, cells, p) {
-                assert!(inside(&layers, resolution, q), "{}", context());
+            if keep && inside(&maps, wide, p) {
+                assert!(inside(&layers, camera, q), "{}", context());
                 kept += 1;
-            } else if !keep && inside(&layers, resolution, p) {
-                let on_map =
-                    (0.0..resolution as f32).contains(&q.x) && (0.0..resolution as f32).contains(&q.y);
-                assert!(!on_map || inside(&maps, cells, q), "{}", context());
+            } else if !keep && inside(&layers, camera, p) {
+                assert!(inside(&maps, wide, q), "{}", context());
                 tested += 1;
             }
         }

@@ -366,11 +366,11 @@ impl Stages {
         let (opacity, occupancy) = (Opacity::new(gpu).unwrap(), Occupancy::new(gpu).unwrap());
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
-        stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, MAPS).unwrap();
+        stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, 50.0, MAPS).unwrap();
         let volumes = &stages.volumes;
         run(gpu, |rec| {
             stages.transfer.record(rec, transfer).unwrap();
-            stages.clips.record(rec, clips).unwrap();
+            stages.clips.record(rec, clips, 50.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
             opacity.record(rec, &stages.field, &stages.transfer, &volumes.full_opacity).unwrap();
             occupancy.record(rec, &stages.field, &stages.transfer, &volumes.occupancy).unwrap();

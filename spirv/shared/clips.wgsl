@@ -18,6 +18,8 @@ struct Clip {
     dilation_at: u32,
     dilation_resolution: u32,
     per_depth: f32,
+    // meshes: corner x, y of the dilation maps in the rigid frame, 1 / cell edge; all: bound of rounding in mm
+    cells: vec4<f32>,
 }
 
 struct Clips {

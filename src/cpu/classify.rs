@@ -71,7 +71,7 @@ pub(super) mod tests {
     use crate::occlusion::{Occlusion, Quadrature, RaySet};
     use std::sync::Arc;
 
-    pub const MAPS: Maps = Maps { layers: 4, resolution: 128, dilation: Dilation::Conservative(64) };
+    pub const MAPS: Maps = Maps { layers: 4, resolution: 128, dilation: Dilation::Conservative(96) };
 
     /// Every analytic shape, a convex and a concave mesh.
     pub fn shapes() -> Vec<Shape> {

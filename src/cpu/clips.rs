@@ -13,7 +13,7 @@ use super::dilate::{self, DilationMap};
 use super::peel::{Report, peel};
 use crate::Result;
 use crate::clip::{Clip, ClipCamera, Mode, Shape};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// Depth in `front` of a pixel without a surface: behind everything.
 pub const NO_FRONT: f32 = 2.0;
@@ -65,7 +65,7 @@ pub struct Maps {
 /// Recipe of the dilation maps.
 #[derive(Clone, Copy, Debug)]
 pub enum Dilation {
-    /// No point within the radius is missed; pixels along an edge, a divisor of Z.
+    /// No point within the radius is missed; cells along an edge.
     Conservative(u32),
     /// CAO eq. (4) as printed, at the layers' resolution; depth in half floats if `half`.
     Literal {
@@ -102,15 +102,22 @@ impl ClipField {
     /// Peels and dilates a mesh clip for rays that reach `reach_mm` in `grid`; an analytic clip needs no maps.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] when the dilation map's resolution does not divide the layers'.
+    /// [`crate::Error::Config`] when the dilation map has fewer than 8 cells along an edge.
     pub fn new(clip: &Clip, grid: &Grid, reach_mm: f32, maps: &Maps) -> Result<Self> {
         let radius_mm = match maps.dilation {
-            Dilation::Conservative(_) => dilate::changed_radius(grid, reach_mm),
+            Dilation::Conservative(_) => {
+                let radius = dilate::changed_radius(grid, reach_mm);
+                let edge = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
+                let half = 0.5 * DVec3::new(edge(0), edge(1), edge(2)).length();
+                radius + clip.rounding_mm(half as f32, radius)
+            }
             Dilation::Literal { .. } => reach_mm,
         };
         let mut field = Self { clip: clip.clone(), radius_mm, mesh: None };
         if let Shape::Mesh(mesh) = &clip.shape {
-            let camera = ClipCamera::around(mesh, clip.pose.scale, radius_mm, maps.resolution);
+            // Only the literal recipe's layers leave room for the dilation.
+            let margin = if matches!(maps.dilation, Dilation::Literal { .. }) { radius_mm } else { 0.0 };
+            let camera = ClipCamera::around(mesh, clip.pose.scale, margin, maps.resolution);
             let (layers, report) = peel(mesh, clip.pose.scale, &camera, maps.layers);
             let dilated = match maps.dilation {
                 Dilation::Conservative(side) => dilate::conservative(&layers, clip.mode, radius_mm, side)?,

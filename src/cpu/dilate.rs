@@ -51,22 +51,34 @@ pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
 /// The conservative map with `resolution` cells along an edge.
 ///
 /// # Errors
-/// [`Error::Config`] when `resolution` does not divide the layers' resolution.
+/// [`Error::Config`] when `resolution` is below 8.
 pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution: u32) -> Result<DilationMap> {
-    let fine = layers.camera.resolution;
-    if resolution == 0 || !fine.is_multiple_of(resolution) {
+    if resolution < 8 {
         return Err(Error::Config {
             what: "dilation map resolution".into(),
-            problem: format!("{resolution}; expected a divisor of the layers' resolution {fine}"),
+            problem: format!("{resolution}; expected at least 8"),
         });
     }
-    let block = (fine / resolution) as usize;
-    let camera = ClipCamera { pixel_mm: layers.camera.pixel_mm * block as f32, resolution, ..layers.camera };
-    let side = resolution as usize;
+    let camera = layers.camera.widened(radius_mm, resolution);
+    let (side, fine) = (resolution as usize, layers.camera.resolution as usize);
+    // Pixels that a row or column of cells touches, with a thousandth of a pixel for rounding; `None` where some lie
+    // beyond the layers.
+    let (cell, pixel) = (f64::from(camera.pixel_mm), f64::from(layers.camera.pixel_mm));
+    let touched = |shift: f32, index: usize| {
+        let from = (f64::from(shift) + index as f64 * cell) / pixel - 1e-3;
+        let to = (f64::from(shift) + (index + 1) as f64 * cell) / pixel + 1e-3;
+        let range = from.floor().max(0.0) as usize..((to.floor() + 1.0).max(0.0) as usize).min(fine);
+        (range, from < 0.0 || to >= fine as f64)
+    };
+    let shift = camera.corner - layers.camera.corner;
     let cells: Vec<[f64; 2]> = (0..side * side)
         .map(|cell| {
-            let (x, y) = (cell % side * block, cell / side * block);
-            let pixels = (0..block * block).map(|i| (y + i / block) * fine as usize + x + i % block);
+            let (columns, past_x) = touched(shift.x, cell % side);
+            let (rows, past_y) = touched(shift.y, cell / side);
+            if mode == Mode::Keep && (past_x || past_y) {
+                return EMPTY;
+            }
+            let pixels = rows.flat_map(|y| columns.clone().map(move |x| y * fine + x));
             merge(mode, pixels.map(|pixel| interval(layers, mode, pixel)))
         })
         .collect();
@@ -234,7 +246,7 @@ mod tests {
     fn conservative_map_contains_every_point_within_the_radius() {
         for (name, mesh) in shapes() {
             for (scale, radius) in [(5.0, 3.0), (20.0, 6.5), (1.0, 9.0), (30.0, 0.7)] {
-                for (fine, coarse) in [(64, 64), (128, 32), (128, 64), (96, 12), (48, 1)] {
+                for (fine, coarse) in [(64, 64), (128, 32), (128, 64), (96, 13), (48, 8), (64, 77)] {
                     let layers = layers(&mesh, scale, radius, fine);
                     let map = conservative(&layers, Mode::Remove, radius, coarse).unwrap();
                     assert_eq!(
@@ -327,11 +339,11 @@ mod tests {
     }
 
     #[test]
-    fn a_resolution_that_does_not_divide_is_refused() {
+    fn a_map_of_too_few_cells_is_refused() {
         let layers = layers(&TriangleMesh::sphere(1), 5.0, 1.0, 32);
-        for side in [0, 5, 64] {
+        for side in [0, 2, 7] {
             let error = conservative(&layers, Mode::Remove, 1.0, side).unwrap_err().to_string();
-            assert!(error.contains("dilation map resolution") && error.contains("32"), "{error}");
+            assert!(error.contains("dilation map resolution") && error.contains("at least 8"), "{error}");
         }
     }
 

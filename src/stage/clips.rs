@@ -29,9 +29,10 @@ struct ClipData {
     dilation_at: u32,
     dilation_resolution: u32,
     per_depth: f32,
+    cells: [f32; 4],
 }
 layout_check!(ClipData => shaders::classify::CLIP {
-    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth
+    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth, cells
 });
 
 #[repr(C)]
@@ -50,7 +51,7 @@ layout_check!(ClipsData => shaders::classify::CLIPS { count, pad0, pad1, pad2, c
 pub struct MapSettings {
     /// Pixels along the edge of the depth layers.
     pub resolution: u32,
-    /// Cells along the edge of the dilation maps; divides `resolution`.
+    /// Cells along the edge of the dilation maps.
     pub cells: u32,
     /// Most layer pairs, 1 … 8.
     pub pairs: u32,
@@ -71,19 +72,12 @@ impl MapSettings {
         if !(8..=4096).contains(&self.resolution) {
             return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
         }
-        if self.cells == 0
-            || !self.resolution.is_multiple_of(self.cells)
-            || (self.literal && self.cells != self.resolution)
-        {
-            let wanted = if self.literal {
-                "the depth map's resolution"
-            } else {
-                "a divisor of the depth map's resolution"
-            };
-            return refuse(
-                "dilation map resolution",
-                format!("{}; expected {wanted}, {}", self.cells, self.resolution),
-            );
+        if self.literal && self.cells != self.resolution {
+            let wanted = format!("the depth map's, {}, for the literal recipe", self.resolution);
+            return refuse("dilation map resolution", format!("{}; expected {wanted}", self.cells));
+        }
+        if !(8..=4096).contains(&self.cells) {
+            return refuse("dilation map resolution", format!("{}; expected 8 … 4096 cells", self.cells));
         }
         if !(1..=MAX_PAIRS).contains(&self.pairs) {
             return refuse("layer pairs", format!("{}; expected 1 … {MAX_PAIRS}", self.pairs));
@@ -99,8 +93,8 @@ pub struct MeshClip {
     pub camera: ClipCamera,
     /// Layer pairs.
     pub pairs: u32,
-    /// Cells along the edge of the dilation maps.
-    pub cells: u32,
+    /// The camera of the dilation maps.
+    pub cells: ClipCamera,
     /// First f32 of the layers.
     pub layers_at: u32,
     /// First f32 of the dilation maps.
@@ -119,6 +113,9 @@ struct Peeled {
     settings: MapSettings,
     layers: Layers,
 }
+
+/// Mesh, scale, whether the outside is hidden, radius of the dilation.
+type Wanted<'a> = (&'a Arc<TriangleMesh>, Vec3, bool, f32);
 
 /// The clips of a scene in device memory.
 pub struct ClipSet {
@@ -148,7 +145,8 @@ impl ClipSet {
     }
 
     /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only
-    /// translations and rotations changed. `radius` in mm is the reach of a change: ray length, footprint and sample cell.
+    /// translations and rotations changed. `radius` in mm is the reach of a change (ray length, footprint and sample cell),
+    /// `half_mm` half the volume's diagonal.
     /// Uses the device's queue and waits for it when there is something to draw; returns the times of the stages.
     pub fn prepare(
         &mut self,
@@ -157,6 +155,7 @@ impl ClipSet {
         dilate: &Dilate,
         clips: &[Clip],
         radius: f32,
+        half_mm: f32,
         settings: MapSettings,
     ) -> Result<Timings> {
         check(clips)?;
@@ -164,14 +163,17 @@ impl ClipSet {
         let mut wanted = Vec::new();
         for clip in clips {
             if let Shape::Mesh(mesh) = &clip.shape {
-                wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep));
+                let radius = radius + clip.rounding_mm(half_mm, radius);
+                wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep, radius));
             }
         }
-        let key: Vec<_> = wanted.iter().map(|&(_, scale, keep)| (scale, keep, radius)).collect();
-        let same_layers = |have: &Peeled, (mesh, scale, _): &(&Arc<TriangleMesh>, Vec3, bool)| {
+        let key: Vec<_> = wanted.iter().map(|&(_, scale, keep, radius)| (scale, keep, radius)).collect();
+        // Only the literal recipe's layers leave room for the dilation.
+        let margin = if settings.literal { radius } else { 0.0 };
+        let same_layers = |have: &Peeled, (mesh, scale, ..): &Wanted| {
             Arc::ptr_eq(&have.mesh, mesh)
                 && have.scale == *scale
-                && have.margin == radius
+                && have.margin == margin
                 && have.settings == settings
         };
         let unchanged = key == self.made_for
@@ -180,34 +182,36 @@ impl ClipSet {
         if unchanged {
             return Ok(Timings::new());
         }
+        // Nothing is there until all of it is, whatever fails on the way.
+        self.made_for.clear();
+        self.meshes.clear();
 
         let mut timings = Timings::new();
         let mut peeled = Vec::new();
         for want in &wanted {
-            let (mesh, scale, _) = *want;
+            let (mesh, scale, ..) = *want;
             let found = self.peeled.iter().position(|have| same_layers(have, want));
             peeled.push(match found {
                 Some(index) => self.peeled.swap_remove(index),
                 None => {
                     // Front and back layers have their meaning only where faces look outward.
                     let solid = mesh.outward()?;
-                    let camera = ClipCamera::around(&solid, scale, radius, settings.resolution);
+                    let camera = ClipCamera::around(&solid, scale, margin, settings.resolution);
                     let layers = peel.run(gpu, &solid, scale, camera, settings.pairs)?;
                     timings.push(("peel".into(), layers.milliseconds));
-                    Peeled { mesh: mesh.clone(), scale, margin: radius, settings, layers }
+                    Peeled { mesh: mesh.clone(), scale, margin, settings, layers }
                 }
             });
         }
         self.peeled = peeled;
-        self.made_for = key;
-        self.meshes.clear();
+        let mut meshes = Vec::new();
         let (mut layers_at, mut dilation_at) = (0, 0);
-        for (have, &(_, _, keep)) in self.peeled.iter().zip(&wanted) {
-            let pairs = have.layers.pairs;
-            self.meshes.push(MeshClip {
-                camera: have.layers.camera,
+        for (have, &(_, _, keep, radius)) in self.peeled.iter().zip(&wanted) {
+            let (pairs, camera) = (have.layers.pairs, have.layers.camera);
+            meshes.push(MeshClip {
+                camera,
                 pairs,
-                cells: settings.cells,
+                cells: if settings.literal { camera } else { camera.widened(radius, settings.cells) },
                 layers_at,
                 dilation_at,
                 keep,
@@ -216,16 +220,16 @@ impl ClipSet {
             layers_at += 2 * pairs * settings.resolution * settings.resolution;
             dilation_at += 2 * pairs * settings.cells * settings.cells;
         }
-        if self.meshes.is_empty() {
+        if meshes.is_empty() {
             return Ok(timings);
         }
         let all: Vec<f32> = self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
         self.layers = super::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
         self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
-        let most = self.meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
+        let most = meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
         let mut rec = gpu.recorder("dilate")?;
-        for mesh in &self.meshes {
+        for (mesh, &(.., radius)) in meshes.iter().zip(&wanted) {
             rec.barrier(
                 &[Access::StorageRead, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite],
@@ -235,11 +239,13 @@ impl ClipSet {
             rec.end_stage()?;
         }
         timings.extend(rec.submit_and_wait()?);
+        self.meshes = meshes;
+        self.made_for = key;
         Ok(timings)
     }
 
     /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
-    pub fn record(&self, rec: &mut Recorder, clips: &[Clip]) -> Result<()> {
+    pub fn record(&self, rec: &mut Recorder, clips: &[Clip], half_mm: f32) -> Result<()> {
         check(clips)?;
         let mut data = ClipsData::zeroed();
         data.count = clips.len() as u32;
@@ -250,6 +256,7 @@ impl ClipSet {
             slot.to_rigid = std::array::from_fn(|i| rows.row(i).extend(moved[i]).to_array());
             slot.scale = clip.pose.scale.extend(clip.pose.scale.min_element()).to_array();
             slot.keep = u32::from(clip.mode == Mode::Keep);
+            slot.cells[3] = clip.rounding_mm(half_mm, 0.0);
             slot.kind = match &clip.shape {
                 Shape::Plane => 0,
                 Shape::Box => 1,
@@ -267,7 +274,8 @@ impl ClipSet {
                     slot.layers_at = map.layers_at;
                     slot.resolution = map.camera.resolution;
                     slot.dilation_at = map.dilation_at;
-                    slot.dilation_resolution = map.cells;
+                    slot.dilation_resolution = map.cells.resolution;
+                    slot.cells = [map.cells.corner.x, map.cells.corner.y, 1.0 / map.cells.pixel_mm, 0.0];
                     slot.per_depth = 1.0 / map.camera.depth_mm;
                     6
                 }

@@ -1,7 +1,7 @@
 //! Dilation maps of a mesh clip (CAO §3.4 step 3, eq. (4)): the Minkowski sum of its depth layers and a sphere, or for a kept
 //! shape the contraction by it.
 //!
-//! In: `layers` (`pairs` × front, back × Z² f32). Out: `dilation` (the same × D² f32), D dividing Z. Conservative: maps stand
+//! In: `layers` (`pairs` × front, back × Z² f32). Out: `dilation` (the same × D² f32), on a wider map. Conservative: maps stand
 //! for cells, distances are between cells, so every point within the radius of any point of the layers is inside; the
 //! literal recipe (D = Z, distances between centres) is kept to show that it is not. Cost: (2·radius/cell)² reads a cell.
 
@@ -22,9 +22,12 @@ struct Params {
     cell_mm: f32,
     depth_mm: f32,
     flags: u32,
+    first: [f32; 2],
+    per_cell: f32,
+    pad: u32,
 }
 layout_check!(Params => shaders::dilate::DILATE_PARAMS {
-    resolution, cells, layers_at, dilation_at, radius, cell_mm, depth_mm, flags
+    resolution, cells, layers_at, dilation_at, radius, cell_mm, depth_mm, flags, first, per_cell
 });
 
 /// The kernel `dilate`.
@@ -60,15 +63,18 @@ impl Dilate {
         let camera = clip.camera;
         let params = Params {
             resolution: camera.resolution,
-            cells: clip.cells,
+            cells: clip.cells.resolution,
             layers_at: clip.layers_at,
             dilation_at: clip.dilation_at,
             radius,
-            cell_mm: camera.pixel_mm * (camera.resolution / clip.cells) as f32,
+            cell_mm: clip.cells.pixel_mm,
             depth_mm: camera.depth_mm,
             flags: u32::from(clip.keep) | u32::from(clip.literal) << 1,
+            first: ((clip.cells.corner - camera.corner) / camera.pixel_mm).truncate().to_array(),
+            per_cell: clip.cells.pixel_mm / camera.pixel_mm,
+            pad: 0,
         };
-        let over = [clip.cells, clip.cells, clip.pairs];
+        let over = [clip.cells.resolution, clip.cells.resolution, clip.pairs];
         let push = bytemuck::bytes_of(&params);
         let binds = [("layers", Bind::Buffer(layers)), ("blocks", Bind::Buffer(blocks))];
         rec.dispatch_over(&self.reduce, &binds, push, over)?;
