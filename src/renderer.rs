@@ -96,6 +96,10 @@ struct Stale {
     ambient: bool,
 }
 
+impl Stale {
+    const ALL: Self = Self { opacity: true, rays: true, precomputed: true, ambient: true };
+}
+
 /// Renders one volume.
 pub struct Renderer {
     gpu: Gpu,
@@ -147,7 +151,7 @@ impl Renderer {
             transfer,
             setup,
             clips: Vec::new(),
-            stale: Stale { opacity: true, rays: true, precomputed: true, ambient: true },
+            stale: Stale::ALL,
             prepared: Timings::new(),
         })
     }
@@ -228,6 +232,10 @@ impl Renderer {
     }
 
     /// Records what brings the ambient volume up to date: nothing where nothing changed.
+    ///
+    /// From here on the renderer takes the commands as done. They must be submitted, in the order of recording and before
+    /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
+    /// nothing counts as done, and what was recorded should not be submitted.
     pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
         let settings = self.settings();
         self.record_opacity(rec)?;
@@ -297,7 +305,28 @@ impl Renderer {
         Ok(timings)
     }
 
+    /// Takes nothing on the device for granted, so that the next update recomputes everything: after commands of
+    /// [`Self::record_update`] that were never submitted. Clip meshes stay prepared: that never waits for the host.
+    pub fn invalidate(&mut self) {
+        self.stale = Stale::ALL;
+    }
+
+    /// Refuses to show or read what no longer fits the scene.
+    fn current(&self) -> Result<()> {
+        let Stale { opacity, precomputed, ambient, .. } = self.stale;
+        // V_PAO is no part of a full computation.
+        if opacity || ambient || (precomputed && self.setup.method == Method::Cao) {
+            return Err(Error::Config {
+                what: "ambient volume".into(),
+                problem: "out of date; call update or record_update first".into(),
+            });
+        }
+        Ok(())
+    }
+
     fn updated(&mut self) {
+        // Hosts that only record never ask for these times; they must not pile up.
+        self.prepared.clear();
         // V_PAO belongs to contextual updates only; a full one leaves it as stale as it was.
         let precomputed = self.stale.precomputed && self.setup.method == Method::Lao;
         self.stale = Stale { opacity: false, rays: false, precomputed, ambient: false };
@@ -361,7 +390,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). The ambient volume must be up to date.
+    /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). Refuses while the ambient volume is out of date.
     pub fn record_draw(
         &self,
         rec: &mut Recorder,
@@ -371,6 +400,7 @@ impl Renderer {
         depth: &Image,
         size: [u32; 2],
     ) -> Result<()> {
+        self.current()?;
         let reference_mm = self.settings().reference_mm;
         self.frame.record(rec, &self.field, views, look, reference_mm)?;
         rec.stage("raycast")?;
@@ -388,8 +418,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws both eyes on the device's own queue and reads them back.
+    /// Draws both eyes on the device's own queue and reads them back. Refuses while the ambient volume is out of date.
     pub fn draw(&self, views: &[View; 2], look: &Look, size: [u32; 2]) -> Result<(StereoImage, Timings)> {
+        self.current()?;
         if size.contains(&0) {
             return Err(Error::Config {
                 what: "image size".into(),
@@ -445,9 +476,10 @@ impl Renderer {
     }
 
     /// Recomputes the ambient volume in full, beside the current one, and compares the two bit by bit on every voxel that has
-    /// a value. Also returns the time of the full recomputation. The ambient volume must be up to date. Uses the device's queue
+    /// a value. Also returns the time of the full recomputation. Refuses while the ambient volume is out of date. Uses the device's queue
     /// and waits for it.
     pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<(Difference, Timings)> {
+        self.current()?;
         let expected = volume_image(&self.gpu, "expected ambient", &self.field, Format::R32Float)?;
         let mut rec = self.gpu.recorder("expected")?;
         rec.discard(&expected);
@@ -469,9 +501,10 @@ impl Renderer {
         Ok((difference, timings))
     }
 
-    /// What the left and the right eye read at world points in mm, in the order given. The ambient volume must be up to date.
+    /// What the left and the right eye read at world points in mm, in the order given. Refuses while the ambient volume is out of date.
     /// Uses the device's queue and waits for it.
     pub fn seen_by_both(&self, views: &[View; 2], look: &Look, points: &[Vec3]) -> Result<Vec<[Seen; 2]>> {
+        self.current()?;
         let mut rec = self.gpu.recorder("frame")?;
         self.frame.record(&mut rec, &self.field, views, look, self.settings().reference_mm)?;
         rec.submit_and_wait()?;
@@ -492,23 +525,25 @@ impl Renderer {
         Ok(Categories { clipped, affected, untouched })
     }
 
-    /// V_AO, x fastest. Uses the device's queue and waits for it.
+    /// V_AO, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_ambient(&self) -> Result<Vec<f32>> {
         Ok(bytemuck::pod_collect_to_vec(&self.read_volume(&self.volumes.ambient)?))
     }
 
-    /// V_o after clipping, x fastest. Uses the device's queue and waits for it.
+    /// V_o after clipping, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_opacity(&self) -> Result<Vec<f32>> {
         Ok(bytemuck::pod_collect_to_vec(&self.read_volume(&self.volumes.opacity)?))
     }
 
-    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched. Uses the device's queue and waits for it.
+    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched. Refuses while out of date. Uses the device's queue and waits
+    /// for it.
     pub fn read_mask(&self) -> Result<Vec<u8>> {
         self.read_volume(&self.volumes.mask)
     }
 
     /// Texels of a volume, slices at a time so that no buffer exceeds a device's limits.
     fn read_volume(&self, image: &Image) -> Result<Vec<u8>> {
+        self.current()?;
         let [x, y, z] = self.field.dims;
         let slice = u64::from(x) * u64::from(y) * image.desc().format.bytes();
         let slices = ((64 << 20) / slice).clamp(1, u64::from(z)) as u32;

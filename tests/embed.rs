@@ -96,3 +96,92 @@ fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
     drop((r, colour, depth, back));
     gpu_support::close(gpu);
 }
+
+fn bits(values: Vec<f32>) -> Vec<u32> {
+    values.into_iter().map(f32::to_bits).collect()
+}
+
+#[test]
+fn a_frame_that_was_dropped_is_made_good_after_invalidate() {
+    let gpu = gpu_support::open();
+    for method in [Method::Cao, Method::Lao] {
+        let (mut hosted, mut own) = (renderer(&gpu, method), renderer(&gpu, method));
+        let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+        for (frame, clips) in [vec![clip(mesh.clone(), 2.0)], vec![clip(Shape::Box, 3.0), clip(mesh, -3.0)]]
+            .into_iter()
+            .enumerate()
+        {
+            hosted.set_clips(&clips).unwrap();
+            let mut dropped = gpu.recorder("dropped frame").unwrap();
+            hosted.record_update(&mut dropped).unwrap();
+            drop(dropped);
+            hosted.invalidate();
+            let times = hosted.update(&mut |_| ()).unwrap();
+            assert!(times.iter().any(|(name, _)| name == "opacity"), "everything runs again: {times:?}");
+            assert!(times.iter().all(|(name, _)| name != "peel"), "times of earlier frames: {times:?}");
+
+            own.set_clips(&clips).unwrap();
+            own.update(&mut |_| ()).unwrap();
+            assert_eq!(hosted.read_opacity().unwrap(), own.read_opacity().unwrap());
+            assert_eq!(hosted.read_mask().unwrap(), own.read_mask().unwrap());
+            let ambient = |r: &Renderer| bits(r.read_ambient().unwrap());
+            assert!(ambient(&hosted) == ambient(&own), "{method:?}, frame {frame}");
+        }
+    }
+    gpu_support::close(gpu);
+}
+
+#[test]
+fn what_is_out_of_date_is_neither_drawn_nor_read() {
+    let gpu = gpu_support::open();
+    let mut r = renderer(&gpu, Method::Cao);
+    let views = StereoRig::framing([24.0; 3], 30.0, 20.0).views(1.0, 1.0, 200.0).unwrap();
+    let look = Look::default();
+    let target = |format| {
+        let usage = ImageUse::ATTACHMENT | ImageUse::SAMPLED;
+        gpu.image("target", &ImageDesc { dims: [8, 8, 1], layers: 2, format, kind: ImageKind::D2, usage })
+            .unwrap()
+    };
+    let (colour, depth) = (target(COLOUR), target(Format::D32Float));
+    let uses = |r: &Renderer| -> Vec<(&str, Option<String>)> {
+        let mut rec = gpu.recorder("frame").unwrap();
+        rec.discard(&colour);
+        rec.discard(&depth);
+        let said = |result: cao::Result<()>| result.err().map(|error| error.to_string());
+        let uses = vec![
+            ("record_draw", said(r.record_draw(&mut rec, &views, &look, &colour, &depth, [8, 8]))),
+            ("draw", said(r.draw(&views, &look, [8, 8]).map(drop))),
+            ("verify", said(r.verify(&mut |_| ()).map(drop))),
+            ("seen_by_both", said(r.seen_by_both(&views, &look, &[Vec3::ZERO]).map(drop))),
+            ("read_ambient", said(r.read_ambient().map(drop))),
+            ("read_opacity", said(r.read_opacity().map(drop))),
+            ("read_mask", said(r.read_mask().map(drop))),
+        ];
+        rec.submit_and_wait().unwrap();
+        uses
+    };
+    type Change = fn(&mut Renderer);
+    let changes: [(&str, Change); 5] = [
+        ("new", |_| ()),
+        ("clips", |r| r.set_clips(&[clip(Shape::Sphere, 5.0)]).unwrap()),
+        ("transfer", |r| r.set_transfer(TransferFunction::preset("paper", (0.0, 255.0)).unwrap()).unwrap()),
+        ("setup", |r| {
+            let setup = Setup { method: Method::Lao, ..*r.setup() };
+            r.set_setup(setup).unwrap();
+        }),
+        ("invalidate", Renderer::invalidate),
+    ];
+    for (change, make) in changes {
+        make(&mut r);
+        for (name, error) in uses(&r) {
+            let error = error.unwrap_or_else(|| panic!("{name} after {change} must be refused"));
+            assert!(error.contains("ambient volume") && error.contains("update"), "{error}");
+        }
+        r.update(&mut |_| ()).unwrap();
+        for (name, error) in uses(&r) {
+            assert_eq!(error, None, "{name} after {change} and an update");
+        }
+    }
+    drop((r, colour, depth));
+    gpu_support::close(gpu);
+}

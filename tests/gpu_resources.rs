@@ -46,6 +46,11 @@ fn texels_come_back_as_they_went_into_an_image_of_any_format() {
         Format::Rgba32Float,
     ];
     for format in formats {
+        // The one format of the list that devices need not have.
+        if format == Format::R16Unorm && !gpu.filters(format) {
+            eprintln!("skipped: this device does not sample {format:?}");
+            continue;
+        }
         let (from, to) = (gpu.image("from", &desc(format)).unwrap(), gpu.image("to", &desc(format)).unwrap());
         let bytes: Vec<u8> = (0..7 * 5 * 3 * format.bytes()).map(|i| (i % 59) as u8).collect();
         upload(&gpu, &from, &bytes);
@@ -205,7 +210,7 @@ fn binding_by_name_refuses_all_that_does_not_fit_and_names_it() {
     let flat = gpu.image("flat", &layered).unwrap();
     let single = gpu.image("single", &ImageDesc { layers: 1, ..layered }).unwrap();
     let float = gpu.image("float", &ImageDesc { format: Format::R32Float, layers: 1, ..layered }).unwrap();
-    let byte = gpu.image("byte", &ImageDesc { usage: ImageUse::STORAGE, ..desc(Format::R8Unorm) }).unwrap();
+    let byte = gpu.image("byte", &ImageDesc { usage: ImageUse::STORAGE, ..desc(Format::R8Uint) }).unwrap();
     let sampled = gpu.image("sampled", &desc(Format::R32Float)).unwrap();
     let sampler = gpu.sampler("sampler", SamplerDesc { linear: false, border_zero: false }).unwrap();
     let mut rec = gpu.recorder("test").unwrap();
@@ -234,7 +239,7 @@ fn binding_by_name_refuses_all_that_does_not_fit_and_names_it() {
             assert!(words.iter().all(|w| message.contains(w)), "{message} lacks one of {words:?}");
         }
     }
-    for (image, word) in [(&byte, "R8Unorm"), (&sampled, "not made for")] {
+    for (image, word) in [(&byte, "R8Uint"), (&sampled, "not made for")] {
         let message = problem(rec.dispatch(&paint, &[("other", Bind::Image(image))], &[], [1; 3]));
         assert!(message.contains(word), "{message}");
     }

@@ -185,6 +185,11 @@ fn open_meshes_and_too_many_layers_are_reported_with_what_was_found() {
     assert_eq!(refusal(&boxes, 3), None);
     let message = refusal(&boxes, 2).unwrap();
     assert!(message.contains("row of boxes") && message.contains("more than 2 layer pairs"), "{message}");
+    assert!(message.contains("at least 3 found") && message.contains("allow up to 8 pairs"), "{message}");
+    // At the limit the remedy is in the mesh: no more pairs can be allowed, and the clip camera turns with the clip.
+    let message = refusal(&row_of_boxes(9), 8).unwrap();
+    assert!(message.contains("more than 8") && message.contains("at least 9 found"), "{message}");
+    assert!(message.contains("several clips") && !message.contains("allow"), "{message}");
 
     let mut open_mesh = TriangleMesh::cuboid();
     // Without a triangle of the face at z = 1.

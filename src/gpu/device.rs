@@ -1,7 +1,8 @@
 //! The device: opened by us, or adopted from a host that owns it.
 
 use super::{
-    feature::{API_VERSION, EXTENSIONS, Features},
+    feature::{self, API_VERSION, EXTENSIONS, Features},
+    format::Format,
     hazard::{Hazards, ResourceId},
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
@@ -274,6 +275,11 @@ impl Gpu {
     /// What is known about the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.0.info
+    }
+
+    /// Whether images of this format can be sampled with linear filtering here.
+    pub fn filters(&self, format: Format) -> bool {
+        feature::filters(&self.0.instance, self.0.physical, format.vk())
     }
 
     /// Messages of the validation layer so far; empty without validation.

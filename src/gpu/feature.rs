@@ -100,38 +100,36 @@ const fn flags(list: &[vk::FormatFeatureFlags]) -> vk::FormatFeatureFlags {
     vk::FormatFeatureFlags::from_raw(bits)
 }
 
-const LINEAR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR;
+const SAMPLED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::SAMPLED_IMAGE;
+/// Read by a filtering sampler.
+const FILTERED: vk::FormatFeatureFlags =
+    flags(&[SAMPLED, vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR]);
 const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
 const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
 
-/// Required uses of formats.
+/// Required uses of formats. `R16_UNORM`, filtered, is optional: 16-bit values become f32 texels without it (`Gpu::filters`).
 pub const FORMATS: &[FormatNeed] = &[
     FormatNeed {
         format: vk::Format::R32_SFLOAT,
-        features: flags(&[LINEAR, STORAGE, COLOUR]),
-        why: "values, opacities, ambient occlusion, depth layers",
+        features: flags(&[FILTERED, STORAGE]),
+        why: "values, opacities, ambient occlusion",
     },
-    FormatNeed {
-        format: vk::Format::R8_UNORM,
-        features: flags(&[LINEAR, STORAGE]),
-        why: "8-bit opacities and ambient occlusion",
-    },
-    FormatNeed { format: vk::Format::R8_UINT, features: STORAGE, why: "masks" },
-    FormatNeed { format: vk::Format::R32_UINT, features: STORAGE, why: "counters" },
-    FormatNeed {
-        format: vk::Format::R16G16B16A16_SFLOAT,
-        features: flags(&[LINEAR, STORAGE, COLOUR, vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND]),
-        why: "pictures",
-    },
+    FormatNeed { format: vk::Format::R8_UNORM, features: FILTERED, why: "8-bit values" },
+    FormatNeed { format: vk::Format::R8_UINT, features: flags(&[SAMPLED, STORAGE]), why: "masks" },
+    FormatNeed { format: vk::Format::R32G32B32A32_SFLOAT, features: COLOUR, why: "pictures" },
     FormatNeed {
         format: vk::Format::D32_SFLOAT,
-        features: flags(&[
-            vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT,
-            vk::FormatFeatureFlags::SAMPLED_IMAGE,
-        ]),
+        features: flags(&[vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT, SAMPLED]),
         why: "depth",
     },
 ];
+
+/// Whether images of this format, with optimal tiling, can be read by a filtering sampler.
+pub(crate) fn filters(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
+    // SAFETY: `device` was enumerated from `instance`.
+    let has = unsafe { instance.get_physical_device_format_properties(device, format) };
+    has.optimal_tiling_features.contains(FILTERED)
+}
 
 /// Everything that this device lacks, in words; empty for a usable one.
 pub(crate) fn missing(instance: &ash::Instance, device: vk::PhysicalDevice) -> Vec<String> {

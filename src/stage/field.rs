@@ -2,7 +2,7 @@
 //!
 //! `value = texel · scale + bias`: unsigned and signed 8- and 16-bit integers become UNORM texels, which hold every
 //! stored value exactly; the file's slope and intercept go into `scale` and `bias`. 32- and 64-bit values are rounded to
-//! f32, the one loss there is.
+//! f32, the one loss there is. Devices need not filter 16-bit UNORM texels; where one cannot, 16-bit values become f32 texels.
 
 use crate::Result;
 use crate::gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
@@ -30,13 +30,7 @@ pub struct Field {
 impl Field {
     /// Copies a volume to the device through a staging buffer. Uses the device's queue and waits for it.
     pub fn upload(gpu: &Gpu, volume: &Volume) -> Result<Self> {
-        let (format, scale, bias) = match &volume.values {
-            Values::U8(_) => (Format::R8Unorm, 255.0, 0.0),
-            Values::I8(_) => (Format::R8Unorm, 255.0, -128.0),
-            Values::U16(_) => (Format::R16Unorm, 65535.0, 0.0),
-            Values::I16(_) => (Format::R16Unorm, 65535.0, -32768.0),
-            _ => (Format::R32Float, 1.0, 0.0),
-        };
+        let (format, scale, bias) = texel_format(&volume.values, gpu.filters(Format::R16Unorm));
         // Slope and intercept of other types are applied in f64 below, before the one rounding to f32.
         let rescaled = format == Format::R32Float;
         let (slope, intercept) = if rescaled { (1.0, 0.0) } else { (volume.slope, volume.intercept) };
@@ -55,7 +49,7 @@ impl Field {
         while first < dims[2] {
             let count = slices.min(dims[2] - first);
             let range = first as usize * slice..(first + count) as usize * slice;
-            staging.write(0, &texels(volume, range))?;
+            staging.write(0, &texels(volume, format, range))?;
             let mut rec = gpu.recorder("upload")?;
             if first == 0 {
                 rec.discard(&image);
@@ -96,12 +90,58 @@ impl Field {
     }
 }
 
-fn texels(volume: &Volume, range: std::ops::Range<usize>) -> Vec<u8> {
-    match &volume.values {
-        Values::U8(v) => v[range].to_vec(),
-        Values::I8(v) => v[range].iter().map(|v| (*v as u8) ^ 0x80).collect(),
-        Values::U16(v) => bytemuck::cast_slice(&v[range]).to_vec(),
-        Values::I16(v) => v[range].iter().flat_map(|v| ((*v as u16) ^ 0x8000).to_ne_bytes()).collect(),
+/// Format, scale and bias of the texels that hold these values, with and without a device that filters `R16Unorm`.
+fn texel_format(values: &Values, r16_ok: bool) -> (Format, f64, f64) {
+    match values {
+        Values::U8(_) => (Format::R8Unorm, 255.0, 0.0),
+        Values::I8(_) => (Format::R8Unorm, 255.0, -128.0),
+        Values::U16(_) if r16_ok => (Format::R16Unorm, 65535.0, 0.0),
+        Values::I16(_) if r16_ok => (Format::R16Unorm, 65535.0, -32768.0),
+        _ => (Format::R32Float, 1.0, 0.0),
+    }
+}
+
+fn texels(volume: &Volume, format: Format, range: std::ops::Range<usize>) -> Vec<u8> {
+    match (&volume.values, format) {
+        (Values::U8(v), Format::R8Unorm) => v[range].to_vec(),
+        (Values::I8(v), Format::R8Unorm) => v[range].iter().map(|v| (*v as u8) ^ 0x80).collect(),
+        (Values::U16(v), Format::R16Unorm) => bytemuck::cast_slice(&v[range]).to_vec(),
+        (Values::I16(v), Format::R16Unorm) => {
+            v[range].iter().flat_map(|v| ((*v as u16) ^ 0x8000).to_ne_bytes()).collect()
+        }
         _ => range.flat_map(|i| (volume.value(i) as f32).to_ne_bytes()).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a kernel makes of the texels of this volume: `texel · scale + bias`, before slope and intercept.
+    fn decoded(values: Values, r16_ok: bool) -> (Format, Vec<f64>) {
+        let (format, scale, bias) = texel_format(&values, r16_ok);
+        let volume = Volume::new([values.len(), 1, 1], [1.0; 3], values).unwrap();
+        let bytes = texels(&volume, format, 0..volume.len());
+        let stored: Vec<f64> = match format {
+            Format::R8Unorm => bytes.iter().map(|&b| f64::from(b) / 255.0).collect(),
+            Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&bytes)
+                .iter()
+                .map(|&t| f64::from(t) / 65535.0)
+                .collect(),
+            _ => bytemuck::pod_collect_to_vec::<u8, f32>(&bytes).iter().map(|&t| f64::from(t)).collect(),
+        };
+        (format, stored.iter().map(|t| (t * scale + bias).round()).collect())
+    }
+
+    #[test]
+    fn values_of_8_and_16_bits_survive_with_and_without_a_filter_for_16_bits() {
+        let unsigned = Values::U16(vec![0, 1, 32767, 65535]);
+        let signed = Values::I16(vec![-32768, -1000, 0, 32767]);
+        for (r16_ok, format) in [(true, Format::R16Unorm), (false, Format::R32Float)] {
+            assert_eq!(decoded(unsigned.clone(), r16_ok), (format, vec![0.0, 1.0, 32767.0, 65535.0]));
+            assert_eq!(decoded(signed.clone(), r16_ok), (format, vec![-32768.0, -1000.0, 0.0, 32767.0]));
+            let bytes = Values::I8(vec![-128, 0, 127]);
+            assert_eq!(decoded(bytes, r16_ok), (Format::R8Unorm, vec![-128.0, 0.0, 127.0]));
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! that it winds around. In: the mesh. Out: depth maps of `resolution²` f32, rows of y, front and back of each pair in turn.
 //! Cost: 2·P + 2 rasterizations of the mesh, once for each mesh, scale and margin.
 
-use crate::clip::ClipCamera;
+use crate::clip::{Clip, ClipCamera};
 use crate::gpu::{
     Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc,
     ImageKind, ImageUse, Pipeline, shaders,
@@ -182,11 +182,18 @@ fn check(
         let beyond = |maps: &[Vec<f32>]| {
             maps.get(max_pairs as usize).map_or(0, |map| map.iter().filter(|&&z| z < 1.0).count())
         };
+        // Turning the clip is no remedy: its camera turns with it. Turning the vertices within their file is one.
+        let more = match max_pairs < MAX_PAIRS {
+            true => format!(", or allow up to {MAX_PAIRS} pairs"),
+            false => String::new(),
+        };
         return refuse(format!(
-            "more than {max_pairs} layer pairs at {} of {} pixels of the clip camera; turn the mesh, split it, or allow up to \
-             {MAX_PAIRS} pairs",
+            "more than {max_pairs} layer pairs at {} of {} pixels of the clip camera: at least {} found; split the mesh into \
+             several clips (up to {}), or turn the mesh's vertices in its file{more}",
             beyond(fronts).max(beyond(backs)),
-            edge * edge
+            edge * edge,
+            max_pairs + 1,
+            Clip::MAX
         ));
     }
     let at = |maps: &[Vec<f32>], layer: usize, pixel: usize| maps.get(layer).map_or(1.0, |map| map[pixel]);

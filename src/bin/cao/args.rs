@@ -188,7 +188,7 @@ pub struct Render {
     #[arg(long, value_name = "DEG", value_parser = elevation, allow_hyphen_values = true)]
     pub elevation: Option<f32>,
     /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
-    #[arg(long, value_name = "MM", value_parser = positive, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", value_parser = distance, allow_hyphen_values = true)]
     pub distance: Option<f32>,
     /// Distance between the eyes in mm [default: 1/15 of that distance, at most 63]
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
@@ -335,7 +335,7 @@ pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
 
     let mut clips = Vec::new();
     for name in values::<String>(matches, "clip") {
-        clips.push(Clip::remove(shape(&name)?));
+        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {name}"))?));
     }
     for (clip, mode) in modes.into_iter().zip(values(matches, "clip_mode")) {
         clips[clip].mode = mode;
@@ -408,6 +408,11 @@ fn length(text: &str) -> Result<f32, String> {
 
 fn positive(text: &str) -> Result<f32, String> {
     number(text, "a length > 0 mm", |mm| mm > 0.0)
+}
+
+/// A head nearer to the volume's centre than this has no direction to look in.
+fn distance(text: &str) -> Result<f32, String> {
+    number(text, "a length > 0 mm, at least 0.001", |mm| mm >= 1e-3)
 }
 
 fn angle(text: &str) -> Result<f32, String> {
