@@ -43,18 +43,20 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             seen.by_eye[out] = vec2(-1.0, 0.0);
             continue;
         }
-        let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
-        let start = index_of(eye.origin.xyz);
-        let along = direction / frame.spacing.xyz;
-        let step = frame.spacing.w / length(direction);
+        let ray = ray_through(eye, uv);
         let exponent = frame.spacing.w / frame.light.w;
         // Up to the voxel that the point belongs to.
-        let t_end = clip.w - 1.5 * max(frame.spacing.x, max(frame.spacing.y, frame.spacing.z)) / length(direction);
+        let voxel = max(frame.spacing.x, max(frame.spacing.y, frame.spacing.z));
+        let end = min(ray.end, clip.w - 1.5 * voxel / length(ray.direction));
         var transmittance = 1.0;
-        for (var t = max(eye.depth.z, 0.0); t < t_end && transmittance > 0.01; t += step) {
-            let a = textureSampleLevel(opacity, field, (start + t * along + 0.5) / frame.dims.xyz, 0.0).r;
+        for (var i = 0u; transmittance > 0.01; i++) {
+            let t = ray.begin + f32(i) * ray.step;
+            if !(t < end) {
+                break;
+            }
+            let a = textureSampleLevel(opacity, field, (ray.start + t * ray.along + 0.5) / frame.dims.xyz, 0.0).r;
             transmittance *= select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
         }
-        seen.by_eye[out] = vec2(transmittance, ambient_at(start + clip.w * along));
+        seen.by_eye[out] = vec2(transmittance, ambient_at(ray.start + clip.w * ray.along));
     }
 }

@@ -74,19 +74,10 @@ fn surface_light(position: vec3<f32>) -> f32 {
 fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32) -> Pixel {
     let uv = place.xy / params.size;
     let eye = frame.eye[view];
-    let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
-    // Index space: the volume is the box from -0.5 to dims - 0.5.
-    let start = index_of(eye.origin.xyz);
-    let along = direction / frame.spacing.xyz;
-    let to_low = (vec3(-0.5) - start) / along;
-    let to_high = (frame.dims.xyz - 0.5 - start) / along;
-    let entry = min(to_low, to_high);
-    let leave = max(to_low, to_high);
-    let t_begin = max(max(entry.x, max(entry.y, entry.z)), eye.depth.z);
-    let t_end = min(min(leave.x, min(leave.y, leave.z)), eye.depth.w);
+    let ray = ray_through(eye, uv);
+    let start = ray.start;
+    let along = ray.along;
 
-    let slant = length(direction);
-    let step = frame.spacing.w / slant;
     let exponent = frame.spacing.w / frame.light.w;
     // Interleaved gradient noise (Jimenez 2014) against banding.
     let noise = fract(52.9829189 * fract(dot(place.xy, vec2(0.06711056, 0.00583715))));
@@ -97,11 +88,12 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
     var colour = vec3(0.0);
     var alpha = 0.0;
     var depth = 1.0;
-    var k = 0.0;
-    var hidden = -1.0;
+    // Samples so far, and that number at the last hidden one: integers, for an f32 stops counting at 2^24.
+    var k = 0u;
+    var hidden = 0xffffffffu;
     loop {
-        let t = t_begin + (k + phase) * step;
-        if !(t < t_end) || alpha >= frame.opaque {
+        let t = ray.begin + (f32(k) + phase) * ray.step;
+        if !(t < ray.end) || alpha >= frame.opaque {
             break;
         }
         let position = start + t * along;
@@ -110,30 +102,31 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
         if occupancy.visible[index] == 0u {
             // To the first sample behind this brick; samples keep their places, so the picture does not change.
             let low = vec3<f32>(brick) * 8.0;
-            let out_low = select((low - start) / along, vec3(3.0e38), brick == vec3(0));
-            let out_high = select((low + 8.0 - start) / along, vec3(3.0e38), brick == last_brick);
+            let out_low = select((low - start) / along, vec3(1e30), brick == vec3(0));
+            let out_high = select((low + 8.0 - start) / along, vec3(1e30), brick == last_brick);
             // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
-            let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(3.0e38), along == vec3(0.0));
+            let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
             let t_out = min(out.x, min(out.y, out.z));
-            k = max(k + 1.0, ceil((t_out - t_begin) / step - phase));
+            let first = ceil((t_out - ray.begin) / ray.step - phase);
+            k = max(k + 1u, u32(clamp(first, 0.0, 1e9)));
             continue;
         }
-        k += 1.0;
+        k += 1u;
         if opacity_of(value_at(position)) <= 0.0 {
             continue;
         }
-        if !visible(eye.origin.xyz + t * direction) {
+        if !visible(eye.origin.xyz + t * ray.direction) {
             hidden = k;
             continue;
         }
         // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
         // one depth and shows no rings.
         var t_shown = t;
-        if hidden == k - 1.0 {
-            var t_hidden = t - step;
+        if hidden == k - 1u {
+            var t_hidden = t - ray.step;
             for (var i = 0u; i < CUT_HALVINGS; i++) {
                 let middle = 0.5 * (t_hidden + t_shown);
-                if visible(eye.origin.xyz + middle * direction) {
+                if visible(eye.origin.xyz + middle * ray.direction) {
                     t_shown = middle;
                 } else {
                     t_hidden = middle;

@@ -234,6 +234,8 @@ fn verify_finds_no_difference_and_says_what_it_compared() {
     assert!(figure("voxels compared") > 10_000.0, "{text}");
     assert_eq!(figure("voxels that differ"), 0.0, "{text}");
     assert_eq!(figure("largest difference"), 0.0, "{text}");
+    let affected = figure("share affected");
+    assert!(affected > 0.0 && affected <= 100.0, "{text}");
     let share = figure("share recomputed");
     assert!(share > 0.0 && share <= 100.0, "{text}");
     assert!(figure("points both eyes see") > 100.0, "{text}");
@@ -249,6 +251,18 @@ fn verify_finds_no_difference_and_says_what_it_compared() {
     // Times are the only thing that a seed does not fix.
     let again = folder.json(&format!("verify builtin:engine:20x14x9:1,1,2 {flags}"));
     assert_eq!(without_times(again), without_times(answer));
+}
+
+#[test]
+fn verify_of_nothing_is_no_success() {
+    let folder = Folder::with_device();
+    let run = folder.run("verify builtin:empty:12 --poses 1 --shapes box");
+    assert_eq!(run.code, Some(1), "{}", run.err);
+    assert!(run.out.contains("nothing to compare: no voxel of builtin:empty:12 has opacity"), "{}", run.out);
+    assert!(!run.out.contains("exact: nothing differs"), "{}", run.out);
+    let run = folder.run("verify builtin:empty:12 --poses 1 --shapes box --json");
+    let answer: Value = serde_json::from_str(&run.out).unwrap();
+    assert_eq!((run.code, &answer["exact"], &answer["vacuous"]), (Some(1), &json!(false), &json!(true)));
 }
 
 /// The same answer without the fields that name milliseconds or times.

@@ -203,6 +203,14 @@ fn scenes_and_transfer_functions_are_refused_by_file_and_key() {
 }
 
 #[test]
+fn a_step_of_too_many_samples_is_refused_by_key_before_the_device_hangs() {
+    let folder = Folder::with_device();
+    folder
+        .put("scene.toml", "volume = \"builtin:engine:8\"\n[image]\nwidth = 8\nheight = 8\nstep_mm = 1e-7\n");
+    refused(&folder, "render scene.toml -o s.png", FAILURE, &["image.step_mm", "100000", "at least"]);
+}
+
+#[test]
 fn meshes_that_enclose_no_solid_are_refused_by_file_and_finding() {
     let folder = Folder::without_device();
     folder.put("open.obj", cube_obj(5)).put("none.obj", "").put("words.obj", "f one two three\n");

@@ -5,6 +5,7 @@ mod common;
 
 use cao::clip::{Clip, Mode, Pose, Shape};
 use cao::cpu::ssao::{Settings, ssao};
+use cao::cpu::trilinear;
 use cao::gpu::Gpu;
 use cao::measure::exactness::{self, compare_eyes};
 use cao::measure::random::Random;
@@ -69,6 +70,71 @@ fn both_eyes_read_identical_bits_wherever_both_see() {
         }
         assert!(points > 500, "{name}: only {points} points were seen by both eyes");
     }
+    close(gpu);
+}
+
+/// What both kernels' eyes read is the volume's: at voxel centres V_AO itself, and in front of them the transmittance of V_o
+/// along the ray, in plain loops.
+#[test]
+fn eyes_read_the_volumes_own_ambient_factor_and_transmittance() {
+    /// Of the interpolation in f32: three coordinates of up to 36 voxels, half a step of f32 twice each.
+    const AMBIENT: f32 = 3.0 * 36.0 * f32::EPSILON;
+    /// Filters weigh in steps of 1/256 on many devices; a ray crosses a few voxels in which that matters.
+    const TRANSMITTANCE: f64 = 0.02;
+
+    let gpu = open();
+    let volume = builtin_box("fruit", [36, 30, 32], [1.0, 0.8, 1.2]).unwrap();
+    let grid = grid_of(&volume);
+    let mut renderer = renderer(&gpu, &volume, RaySet::R14);
+    renderer.update(&mut |_| ()).unwrap();
+    let (ambient, opacity) = (renderer.read_ambient().unwrap(), renderer.read_opacity().unwrap());
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let reference = f64::from(transfer.reference_mm(volume.min_spacing()));
+    let step = 0.25 * volume.min_spacing();
+    let voxels: Vec<usize> = (0..grid.len()).step_by(7).collect();
+    let points: Vec<Vec3> = voxels
+        .iter()
+        .map(|&i| Vec3::from_array(grid.to_world(grid.voxel(i).map(|c| c as f64)).map(|c| c as f32)))
+        .collect();
+    let views = eyes(&volume, 30.0);
+    let half = 0.5 * size_mm(&grid);
+    let mut compared = 0;
+    for (n, seen) in renderer.seen_by_both(&views, &Look::default(), &points).unwrap().iter().enumerate() {
+        for (view, seen) in views.iter().zip(seen) {
+            if seen.transmittance < 0.0 {
+                continue;
+            }
+            let expected = ambient[voxels[n]];
+            assert!((seen.ambient - expected).abs() <= AMBIENT, "{} {expected}", seen.ambient);
+            let (uv, _) = view.project(points[n]).unwrap();
+            let (origin, direction) = view.ray(uv);
+            let at_depth = |t: f64| origin.as_dvec3() + t * direction.as_dvec3();
+            let slant = direction.as_dvec3().length();
+            let (a, b) = ((-half - origin) / direction, (half - origin) / direction);
+            let begin = f64::from(a.min(b).max_element().max(view.near_mm));
+            let depth = f64::from((points[n] - view.position).dot(view.orientation * -Vec3::Z));
+            let end = depth - 1.5 * 1.2 / slant;
+            let samples = (end - begin) * slant / step;
+            // One sample more or less is a matter of rounding there.
+            if (samples - samples.round()).abs() < 1e-3 {
+                continue;
+            }
+            let mut transmittance = 1.0;
+            for i in 0..samples.ceil().max(0.0) as u32 {
+                let place = at_depth(begin + f64::from(i) * step / slant).to_array();
+                let a = trilinear(&grid, &opacity, grid.to_index(place));
+                transmittance *= (1.0 - a).max(0.0).powf(step / reference);
+                if transmittance <= 0.01 {
+                    break;
+                }
+            }
+            let off = (f64::from(seen.transmittance) - transmittance).abs();
+            assert!(off <= TRANSMITTANCE, "{} {transmittance} at {}", seen.transmittance, points[n]);
+            compared += 1;
+        }
+    }
+    assert!(compared > 2000, "{compared}");
+    drop(renderer);
     close(gpu);
 }
 

@@ -11,6 +11,8 @@
 //! A(x) = Σ_k w_k A_k(x),  Σ_k w_k = 1                                             CAO eq. (3)
 //! ```
 //!
+//! Eq. (3) is printed as A = 1/K Σ_k w_k A_k; the w_k here are w_k/K there.
+//!
 //! The segments run from the offset o, where q is the mean of its values at s_0 = o − Δ/2 and s_1, to s_1 (length
 //! Δ/2), and from each sample to the next (length Δ). A segment with q below [`OPAQUE`] at both ends lets nothing
 //! through and adds nothing, the limit of its formula.

@@ -1,5 +1,5 @@
 //! Image-space ambient occlusion, the control that must *fail* where data-space values agree: it knows only what one
-//! eye's depth image shows, so the two eyes shade the same point differently (Shi et al. 2012, CAO §1).
+//! eye's depth image shows, so the two eyes shade the same point differently (Shi et al. 2022, CAO §1).
 //!
 //! As VTK's pass: at each pixel a hemisphere of K points within R around the surface, rotated by a hash of the pixel;
 //!

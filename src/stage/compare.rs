@@ -35,7 +35,7 @@ layout_check!(Counters => shaders::compare::DIFFERENCE { compared, different, la
 pub struct Difference {
     /// Voxels that have a value.
     pub compared: u64,
-    /// Of these, voxels whose 32 bits are not the same.
+    /// Of these, voxels whose 32 bits are not the same, or that are not within 0 … 1.
     pub different: u64,
     /// Largest |expected − actual| among those.
     pub largest: f32,

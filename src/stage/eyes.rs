@@ -78,6 +78,25 @@ impl Default for Look {
     }
 }
 
+/// Most samples on a ray. A frame of more is no better and keeps a device busy for so long that its driver gives up.
+const MAX_SAMPLES: f32 = 1e5;
+
+/// The distance between samples in mm, refused where a ray along the volume's diagonal would take too many.
+fn checked_step(field: &Field, look: &Look) -> Result<f32> {
+    let step = look.step_mm.unwrap_or(0.25 * field.min_spacing());
+    let size = Vec3::from_array(std::array::from_fn(|i| field.dims[i] as f32 * field.spacing[i]));
+    let samples = size.length() / step;
+    if samples <= MAX_SAMPLES {
+        return Ok(step);
+    }
+    Err(Error::Limit {
+        what: format!("image.step_mm = {step}: samples along the volume's diagonal"),
+        needed: samples as u64,
+        limit: MAX_SAMPLES as u64,
+        hint: format!("choose a step of at least {} mm", size.length() / MAX_SAMPLES),
+    })
+}
+
 impl Look {
     fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
@@ -117,7 +136,8 @@ impl FrameBuffer {
         Ok(Self { buffer: gpu.buffer("frame", size_of::<Frame>() as u64, BufferUse::Device)? })
     }
 
-    /// Writes the frame and makes it visible to all shaders.
+    /// Writes the frame and makes it visible to all shaders. Fails on impossible values in `views` or `look`, and with
+    /// [`Error::Limit`] where the step is so small that a ray has more than 10⁵ samples.
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -127,6 +147,7 @@ impl FrameBuffer {
         reference_mm: f32,
     ) -> Result<()> {
         look.check()?;
+        let step = checked_step(field, look)?;
         let mut data = Frame::zeroed();
         for (eye, view) in data.eye.iter_mut().zip(views) {
             view.check()?;
@@ -141,7 +162,6 @@ impl FrameBuffer {
                 view_projection: view.view_projection().to_cols_array_2d(),
             };
         }
-        let step = look.step_mm.unwrap_or(0.25 * field.min_spacing());
         data.dims = [field.dims[0] as f32, field.dims[1] as f32, field.dims[2] as f32, 0.0];
         data.spacing = [field.spacing[0], field.spacing[1], field.spacing[2], step];
         data.light = look.light.normalize().extend(reference_mm).to_array();

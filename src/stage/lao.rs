@@ -1,5 +1,6 @@
 //! Local ambient occlusion over a list of bricks: CAO eq. (2) and (3),
 //! `A(x) = Σ_k w_k A_k(x)`, `A_k(x) = 1/M Σ_{m=1..M} Π_{i<m} (1 − a_i)`, or one of the better quadratures of method.md §3.
+//! Eq. (3) is printed with a factor 1/K; the w_k here are w_k/K there, with the sum 1.
 //!
 //! In: `opacity` V_o, `list`, and for a contextual update `mask` V_m and `precomputed` V_PAO. Out: `ambient` (3D r32float).
 //! Cost: K·M trilinear samples for each voxel computed.

@@ -41,6 +41,7 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     let mut out = Out::new(global);
     out.device(&gpu);
     let mut exact = true;
+    let mut vacuous = false;
     let mut reports = Vec::new();
     for (input, volume, setup, transfer) in inputs {
         progress.stage("preparing");
@@ -50,12 +51,17 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
         let report = verify(&mut renderer, &plan, &mut |done| progress.set(done))?;
         print(&mut out, input, &report, args.seed);
         exact &= report.exact();
+        vacuous |= report.vacuous();
         reports.push(as_json(input, &report));
     }
     drop(progress);
     check_validation(&gpu)?;
-    out.line(if exact { "exact: nothing differs" } else { "NOT EXACT: see the lines above" });
-    out.json(json!({ "exact": exact, "seed": args.seed, "volumes": reports }));
+    out.line(match (exact, vacuous) {
+        (true, _) => "exact: nothing differs",
+        (false, true) => "NOT VERIFIED: see the lines above",
+        (false, false) => "NOT EXACT: see the lines above",
+    });
+    out.json(json!({ "exact": exact, "vacuous": vacuous, "seed": args.seed, "volumes": reports }));
     out.finish()?;
     Ok(if exact { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -68,10 +74,21 @@ fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
     out.line(format!("  voxels that differ  {:>12}", total.different));
     out.line(format!("  largest difference  {:>12}", total.largest));
     out.line(format!("  share recomputed    {share:>11.1} %"));
+    out.line(format!(
+        "  share affected      {:>11.1} % (of all voxels, the paper's measure)",
+        100.0 * report.affected()
+    ));
     out.line(format!("  full / contextual   {:>11.2} x (median of times)", report.speedup()));
     let stereo = report.stereo;
     out.line(format!("  points both eyes see{:>12}", stereo.points));
     out.line(format!("  points that differ  {:>12}", stereo.different));
+    if total.compared == 0 {
+        out.line(format!(
+            "  nothing to compare: no voxel of {input} has opacity; choose another transfer function"
+        ));
+    } else if stereo.points == 0 {
+        out.line("  nothing to compare between the eyes: both see no point; choose another seed or transfer function");
+    }
     for trial in report.trials.iter().filter(|trial| trial.difference.different > 0) {
         let (clip, d) = (&trial.clip, trial.difference);
         out.line(format!(
@@ -108,6 +125,8 @@ fn as_json(input: &str, report: &Report) -> serde_json::Value {
         "voxels_different": total.different,
         "largest_difference": total.largest,
         "share_recomputed": total.recomputed as f64 / total.compared.max(1) as f64,
+        "share_affected": report.affected(),
+        "vacuous": report.vacuous(),
         "full_over_contextual_time": report.speedup(),
         "points_seen_by_both_eyes": report.stereo.points,
         "points_different": report.stereo.different,
