@@ -163,7 +163,8 @@ impl ClipSet {
         let mut wanted = Vec::new();
         for clip in clips {
             if let Shape::Mesh(mesh) = &clip.shape {
-                let radius = radius + clip.rounding_mm(half_mm, radius);
+                let rounding = if settings.literal { 0.0 } else { clip.rounding_mm(half_mm, radius) };
+                let radius = radius + rounding;
                 wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep, radius));
             }
         }
