@@ -148,6 +148,7 @@ impl ClipSet {
     /// translations and rotations changed. `radius` in mm is the reach of a change (ray length, footprint and sample cell),
     /// `half_mm` half the volume's diagonal.
     /// Uses the device's queue and waits for it when there is something to draw; returns the times of the stages.
+    #[expect(clippy::too_many_arguments, reason = "kernels, clips and settings, each named once")]
     pub fn prepare(
         &mut self,
         gpu: &Gpu,
