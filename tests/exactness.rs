@@ -271,7 +271,7 @@ fn a_refused_setup_leaves_the_renderer_as_it_was() {
     let before = renderer.read_ambient().unwrap();
     let occlusion = Occlusion { radius_mm: 6.0, ..good.occlusion };
     for bad in [
-        Setup { occlusion, maps: MapSettings { cells: 7, ..MAPS }, ..good },
+        Setup { occlusion, maps: MapSettings { cells: 3, ..MAPS }, ..good },
         Setup { occlusion, maps: MapSettings { pairs: 0, ..MAPS }, ..good },
         Setup { occlusion: Occlusion { radius_mm: f32::NAN, ..occlusion }, ..good },
     ] {
@@ -427,5 +427,47 @@ fn the_literal_dilation_fails_where_the_conservative_one_does_not() {
         "literal: {} of {} voxels stale in {POSES} poses, by up to {}; conservative: none of {}",
         literal.different, literal.compared, literal.largest, conservative.compared
     );
+    close(gpu);
+}
+
+/// The layers of a mesh are drawn without regard to the rays: the longest leave the cut as the shortest do.
+#[test]
+fn the_cut_of_a_mesh_does_not_depend_on_the_radius() {
+    let gpu = open();
+    let volume = builtin_box("uniform", [16; 3], [1.0; 3]).unwrap();
+    let short = setup(RaySet::R6, Quadrature::Left, 1.0, Scope::All);
+    let mut renderer = renderer(&gpu, &volume, short);
+    let pose = Pose { scale: Vec3::splat(5.0), ..Pose::default() };
+    renderer.set_clips(&[Clip { shape: Shape::Mesh(concave()), mode: Mode::Remove, pose }]).unwrap();
+    let mut cut = None;
+    for radius_mm in [1.0, 20.0, 2000.0] {
+        let occlusion = Occlusion { radius_mm, ..short.occlusion };
+        renderer.set_setup(Setup { occlusion, ..short }).unwrap();
+        assert_eq!(verify(&mut renderer).different, 0, "radius {radius_mm}");
+        let opacity = renderer.read_opacity().unwrap();
+        assert!(opacity.contains(&0.0), "radius {radius_mm}: nothing is cut");
+        assert!(cut.get_or_insert_with(|| opacity.clone()) == &opacity, "radius {radius_mm}");
+    }
+    drop(renderer);
+    close(gpu);
+}
+
+/// Clips whose coordinates round to more than a voxel: far away, far larger than the volume, voxels of micrometres. Both were
+/// inexact before rounding had a bound of its own.
+#[test]
+fn contextual_equals_full_where_rounding_is_coarser_than_voxels() {
+    let gpu = open();
+    for (spacing, shape, mode, scale, at, radius) in [
+        (0.003, Shape::Cone, Mode::Remove, 287_824.78, Vec3::new(41_700.2, -137_738.41, 0.0), 0.006),
+        (0.001, Shape::Cylinder, Mode::Keep, 21_928.494, Vec3::new(20_880.557, 6_697.85, 0.0), 0.001),
+    ] {
+        let volume = builtin_box("uniform", [16; 3], [spacing; 3]).unwrap();
+        let setup = setup(RaySet::R26, Quadrature::Cell, radius, Scope::All);
+        let mut renderer = renderer(&gpu, &volume, setup);
+        let pose = Pose { translate_mm: at, scale: Vec3::splat(scale), ..Pose::default() };
+        renderer.set_clips(&[Clip { shape, mode, pose }]).unwrap();
+        assert_eq!(verify(&mut renderer).different, 0, "spacing {spacing}");
+        drop(renderer);
+    }
     close(gpu);
 }

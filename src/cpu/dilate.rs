@@ -51,12 +51,12 @@ pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
 /// The conservative map with `resolution` cells along an edge.
 ///
 /// # Errors
-/// [`Error::Config`] when `resolution` is below 8.
+/// [`Error::Config`] when `resolution` is below 4.
 pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution: u32) -> Result<DilationMap> {
-    if resolution < 8 {
+    if resolution < 4 {
         return Err(Error::Config {
             what: "dilation map resolution".into(),
-            problem: format!("{resolution}; expected at least 8"),
+            problem: format!("{resolution}; expected at least 4"),
         });
     }
     let camera = layers.camera.widened(radius_mm, resolution);
@@ -246,7 +246,7 @@ mod tests {
     fn conservative_map_contains_every_point_within_the_radius() {
         for (name, mesh) in shapes() {
             for (scale, radius) in [(5.0, 3.0), (20.0, 6.5), (1.0, 9.0), (30.0, 0.7)] {
-                for (fine, coarse) in [(64, 64), (128, 32), (128, 64), (96, 13), (48, 8), (64, 77)] {
+                for (fine, coarse) in [(64, 64), (128, 32), (128, 64), (96, 13), (48, 4), (64, 77)] {
                     let layers = layers(&mesh, scale, radius, fine);
                     let map = conservative(&layers, Mode::Remove, radius, coarse).unwrap();
                     assert_eq!(
@@ -341,9 +341,9 @@ mod tests {
     #[test]
     fn a_map_of_too_few_cells_is_refused() {
         let layers = layers(&TriangleMesh::sphere(1), 5.0, 1.0, 32);
-        for side in [0, 2, 7] {
+        for side in [0, 2, 3] {
             let error = conservative(&layers, Mode::Remove, 1.0, side).unwrap_err().to_string();
-            assert!(error.contains("dilation map resolution") && error.contains("at least 8"), "{error}");
+            assert!(error.contains("dilation map resolution") && error.contains("at least 4"), "{error}");
         }
     }
 

@@ -76,8 +76,8 @@ impl MapSettings {
             let wanted = format!("the depth map's, {}, for the literal recipe", self.resolution);
             return refuse("dilation map resolution", format!("{}; expected {wanted}", self.cells));
         }
-        if !(8..=4096).contains(&self.cells) {
-            return refuse("dilation map resolution", format!("{}; expected 8 … 4096 cells", self.cells));
+        if !(4..=4096).contains(&self.cells) {
+            return refuse("dilation map resolution", format!("{}; expected 4 … 4096 cells", self.cells));
         }
         if !(1..=MAX_PAIRS).contains(&self.pairs) {
             return refuse("layer pairs", format!("{}; expected 1 … {MAX_PAIRS}", self.pairs));
