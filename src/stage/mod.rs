@@ -14,6 +14,8 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod sweep;
+pub mod sweep_list;
 pub mod transfer;
 
 use crate::Result;
