@@ -2,6 +2,7 @@
 //! equation and its source, what goes in and out, and what it costs.
 
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
@@ -11,6 +12,7 @@ pub mod dilate;
 pub mod eyes;
 pub mod field;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;
