@@ -4,12 +4,14 @@
 //! its equation. Geometry that decides visibility (shape distances, depth maps) is f32, as [`crate::clip`] defines it.
 
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;
