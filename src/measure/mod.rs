@@ -1,4 +1,7 @@
-//! Numbers in, numbers out: whether the claims hold.
+//! Numbers in, numbers out: whether the claims hold, and how far results are from the truth.
 
+pub mod error;
 pub mod exactness;
 pub mod random;
+pub mod reference;
+pub mod ssim;
