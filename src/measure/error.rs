@@ -1,6 +1,7 @@
 //! Errors of an ambient volume or an image against a reference (measure.md §2).
 //!
-//! Only voxels that a renderer can sample count: see [`counting`]. Structural similarity is in [`super::ssim`].
+//! Only voxels that a renderer can sample count: see [`counting`]. Structural similarity is in [`super::ssim`], FLIP in
+//! [`super::flip`].
 
 use crate::cpu::Grid;
 

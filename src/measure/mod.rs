@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod exactness;
+pub mod flip;
 pub mod random;
 pub mod reference;
 pub mod ssim;
