@@ -16,6 +16,7 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod reference;
 pub mod ssao;
 pub mod sweep;
 
