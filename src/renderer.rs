@@ -15,6 +15,7 @@ use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
 use crate::method::{cao, lao};
 use crate::occlusion::Occlusion;
 use crate::scene::Method;
+use crate::stage::brick_distance::BrickDistance;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
 use crate::stage::compare::{Compare, Difference};
@@ -108,6 +109,7 @@ pub struct Renderer {
     kernels: Kernels,
     opacity: Opacity,
     occupancy: Occupancy,
+    brick_distance: BrickDistance,
     peel: Peel,
     dilate: Dilate,
     raycast: Raycast,
@@ -141,6 +143,7 @@ impl Renderer {
             kernels: Kernels::new(gpu)?,
             opacity: Opacity::new(gpu)?,
             occupancy: Occupancy::new(gpu)?,
+            brick_distance: BrickDistance::new(gpu, &field)?,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,
             raycast: Raycast::new(gpu, colour)?,
@@ -388,6 +391,10 @@ impl Renderer {
             &self.volumes.mask,
         )?;
         rec.end_stage()?;
+        rec.stage("distances")?;
+        let v = &self.volumes;
+        self.brick_distance.record(rec, &self.field, &v.occupancy, clip_bricks, &v.distances)?;
+        rec.end_stage()?;
         rec.barrier(
             &[Access::StorageWrite],
             &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
@@ -414,7 +421,7 @@ impl Renderer {
             transfer: &self.transfer_buffer,
             opacity: &self.volumes.opacity,
             ambient: &self.volumes.ambient,
-            occupancy: &self.volumes.occupancy,
+            distances: &self.volumes.distances,
             clips: &self.clip_set,
             frame: &self.frame,
         };
