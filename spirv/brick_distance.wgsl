@@ -4,7 +4,7 @@
 //   d_x(b) = min |dx| over bricks that show something,  d_y(b) = min max(|dy|, d_x),  d_z(b) = min max(|dz|, d_y).
 //
 // A word holds two distances of 12 bits, to the nearest brick with opacity and to the nearest that is not wholly hidden by
-// the clips either, and a bit for each clip that hides any of it.
+// the clips either, and a bit for each clip that may hide some of it.
 
 struct BrickDistanceParams {
     bricks: vec3<u32>,
@@ -38,19 +38,21 @@ fn count() -> u32 {
     return params.bricks.x * params.bricks.y * params.bricks.z;
 }
 
-// Whether the clips hide all that a ray reads in a brick, and which clips hide any of it. To a ray a brick reaches from voxel centre 8b
+// Whether the clips hide all that a ray reads in a brick, and which may hide some. To a ray a brick reaches from voxel centre 8b
 // to 8b + 8, half a voxel into those above it, whose boxes hold whole voxels.
 fn to_rays(index: u32) -> vec2<u32> {
     let brick = vec3(index % params.bricks.x, index / params.bricks.x % params.bricks.y, index / (params.bricks.x * params.bricks.y));
     var hidden = 1u;
-    var cutting = 0u;
+    var asked = 0u;
     for (var i = 0u; i < 8u; i++) {
         let at = min(brick + vec3(i & 1u, i >> 1u & 1u, i >> 2u), params.bricks - 1u);
         let code = clip_bricks.code[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
-        hidden &= u32((code & 3u) == HIDDEN);
-        cutting |= code >> 4u & 0xffu;
+        let whole = (code & 3u) == HIDDEN;
+        hidden &= u32(whole);
+        // Who hides it whole the code does not say.
+        asked |= select(code >> 4u & 0xffu, 0xffu, whole);
     }
-    return vec2(hidden, cutting);
+    return vec2(hidden, asked);
 }
 
 fn first_of(index: u32) -> vec2<u32> {
@@ -64,8 +66,8 @@ fn distances_of(word: u32) -> vec2<u32> {
     return vec2(word & FAR, word >> 12u & FAR);
 }
 
-fn word_of(distance: vec2<u32>, cutting: u32) -> u32 {
-    return distance.x | distance.y << 12u | cutting << 24u;
+fn word_of(distance: vec2<u32>, asked: u32) -> u32 {
+    return distance.x | distance.y << 12u | asked << 24u;
 }
 
 // One invocation a brick.

@@ -161,7 +161,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
         }
         visibility = joined_visibility(visibility, sees);
         reach = max(reach, near);
-        cutting |= select(0u, 1u << c, sees != VISIBLE);
+        cutting |= select(0u, 1u << c, sees == CUT || sees == SAMPLED);
         reaching |= select(0u, 1u << c, near == SOME);
     }
     clip_bricks.code[index] = visibility | reach << 2u | cutting << 4u | reaching << 12u;

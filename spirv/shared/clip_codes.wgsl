@@ -12,7 +12,7 @@ const NONE = 0u;
 const SOME = 1u;
 const ALL = 2u;
 
-// A word a brick of 8x8x8 voxels, x fastest: visibility (2 bits), reach (2 bits), a bit for each clip that hides any of it (8), and
+// A word a brick of 8x8x8 voxels, x fastest: visibility (2 bits), reach (2 bits), a bit for each clip that cuts it (8), and
 // a bit for each clip that reaches some of its voxels (8).
 struct ClipBricks {
     code: array<u32>,

@@ -16,6 +16,7 @@ pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod ssao;
+pub mod sweep;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

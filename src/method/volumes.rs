@@ -3,14 +3,13 @@
 use crate::Result;
 use crate::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use crate::occlusion::Occlusion;
-use crate::stage::brick_distance::BrickDistance;
 use crate::stage::bricks::{BrickList, Bricks};
 use crate::stage::classify::Classify;
 use crate::stage::clip_bricks::ClipBricks;
 use crate::stage::field::Field;
 use crate::stage::lao::{Lao, Scope};
 
-/// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 24 a brick of 512.
+/// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 16 a brick of 512.
 pub struct Volumes {
     /// Opacity before clipping, r32float.
     pub full_opacity: Image,
@@ -26,8 +25,6 @@ pub struct Volumes {
     pub clip_bricks: Buffer,
     /// Bricks with opacity before clipping, u32 each.
     pub occupancy: Buffer,
-    /// How far the ray cast may leap from each brick, u32 each.
-    pub distances: Buffer,
     /// Bricks that the last contextual update changed, u32 each.
     pub changed_before: Buffer,
     /// Bricks to work on.
@@ -46,7 +43,6 @@ impl Volumes {
             ambient: volume_image(gpu, "ambient", field, Format::R32Float)?,
             clip_bricks: ClipBricks::buffer(gpu, field)?,
             occupancy: gpu.buffer("occupancy", bricks, BufferUse::Device)?,
-            distances: BrickDistance::buffer(gpu, field)?,
             changed_before: gpu.buffer("changed before", bricks, BufferUse::Device)?,
             list: BrickList::new(gpu, field)?,
         };
