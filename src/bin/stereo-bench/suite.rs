@@ -5,7 +5,8 @@ use super::common::args::{open, setup, shape, usage};
 use super::common::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use super::frames::{Configuration, Input, Measured, Plan, measure};
 use super::path::PERIOD;
-use super::{csv, machine, report, save};
+use super::save::Folder;
+use super::{csv, machine, report};
 use anyhow::{Context, Result};
 use cao::gpu::{DeviceKind, Gpu};
 use cao::scene::Method;
@@ -49,7 +50,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         DeviceKind::Cpu => SOFTWARE_FRAMES,
         _ => PERIOD,
     });
-    let kept = cli.save.as_deref().map(|folder| save::folder(folder, &gpu)).transpose()?;
+    let kept = cli.save.as_deref().map(|folder| Folder::new(folder, &gpu)).transpose()?;
     progress.stage("measuring");
     let total = plan.total() * wanted.len() as u64;
     let mut done = 0;
@@ -76,6 +77,10 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     );
     out.line(format!("views     {} of {} x {} pixels, in one pass", base.views, base.size[0], base.size[1]));
     out.line(format!("clip      {}", cli.clip));
+    out.line(match cli.all_voxels {
+        true => "voxels    all",
+        false => "voxels    those that a sample with opacity can touch",
+    });
     out.line(report::tables(&plan, &results[0].1).trim_end());
     out.json(json!({
         "machine": machine,
@@ -105,7 +110,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         scale.insert((*name).into(), values.collect());
     }
     out.json(json!({ "scale": scale }));
-    write(cli, &mut out, &results, kept.as_deref(), &gpu)?;
+    write(cli, &mut out, &results, kept.as_ref(), &gpu)?;
     out.finish()?;
     Ok(ExitCode::SUCCESS)
 }
@@ -137,7 +142,7 @@ fn write(
     cli: &Cli,
     out: &mut Out,
     results: &[(Configuration, Vec<Measured>)],
-    kept: Option<&Path>,
+    kept: Option<&Folder>,
     gpu: &Gpu,
 ) -> Result<()> {
     if cli.csv.is_none() && kept.is_none() {
@@ -150,7 +155,7 @@ fn write(
         out.wrote(path);
     }
     if let Some(folder) = kept {
-        for path in save::write(folder, gpu, &table, &summary)? {
+        for path in folder.write(gpu, &table, &summary)? {
             out.wrote(&path);
         }
     }
