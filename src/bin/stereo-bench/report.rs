@@ -76,7 +76,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
-        "            affected: share of the voxels whose neighbourhood the clip changed, mean (its Table 2)"
+        "            affected: share of the voxels whose neighbourhood the clip changed, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());

@@ -32,10 +32,13 @@ impl Folder {
         }
     }
 
-    /// Writes the three files and returns their paths.
-    pub fn write(&self, gpu: &Gpu, csv: &str, summary: &str) -> Result<Vec<PathBuf>> {
-        let files =
-            [("raw.csv", csv.to_owned()), ("summary", summary.to_owned()), ("README.md", readme(gpu))];
+    /// Writes the three files and returns their paths; `machine` describes it as the run began.
+    pub fn write(&self, gpu: &Gpu, machine: &str, csv: &str, summary: &str) -> Result<Vec<PathBuf>> {
+        let files = [
+            ("raw.csv", csv.to_owned()),
+            ("summary", summary.to_owned()),
+            ("README.md", readme(gpu, machine)),
+        ];
         files
             .into_iter()
             .map(|(name, text)| {
@@ -54,7 +57,7 @@ impl Drop for Folder {
     }
 }
 
-fn readme(gpu: &Gpu) -> String {
+fn readme(gpu: &Gpu, machine: &str) -> String {
     let info = gpu.info();
     let [major, minor, patch] = info.api_version;
     let [year, month, day] = machine::today();
@@ -73,7 +76,7 @@ fn readme(gpu: &Gpu) -> String {
         env!("CARGO_PKG_VERSION"),
         info.name,
         info.driver,
-        machine::describe(),
+        machine,
     )
 }
 
