@@ -3,6 +3,7 @@
 //! Written from the paper, not from the shaders; not tuned, and no fallback for a missing GPU. Each file opens with
 //! its equation. Geometry that decides visibility (shape distances, depth maps) is f32, as [`crate::clip`] defines it.
 
+pub mod brick_distance;
 pub mod bricks;
 pub mod classify;
 pub mod clip_bricks;
@@ -15,6 +16,7 @@ pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod ssao;
+pub mod sweep;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

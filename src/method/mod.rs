@@ -3,4 +3,5 @@
 pub mod cao;
 pub mod lao;
 mod parts;
+pub mod sweep;
 pub mod volumes;
