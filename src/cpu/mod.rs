@@ -5,16 +5,19 @@
 
 pub mod brick_distance;
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod reference;
 pub mod ssao;
 pub mod sweep;
 

@@ -18,6 +18,7 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod reference;
 pub mod sweep;
 pub mod sweep_list;
 pub mod transfer;
