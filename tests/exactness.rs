@@ -13,7 +13,7 @@ use cao::scene::Method;
 use cao::stage::bricks::{BrickList, Bricks, Which};
 use cao::stage::classify::AntiAliasing;
 use cao::stage::clips::MapSettings;
-use cao::stage::compare::{Compare, Difference};
+use cao::stage::compare::{Compare, Difference, Recomputed};
 use cao::stage::eyes::Look;
 use cao::stage::field::Field;
 use cao::stage::lao::Scope;
@@ -332,7 +332,7 @@ fn a_renderer_that_recomputes_agrees_with_one_that_updates() {
             let (opacity, mask) = (updates.read_opacity().unwrap(), updates.read_mask().unwrap());
             assert_eq!(recomputes.read_opacity().unwrap(), opacity);
             let (actual, expected) = (updates.read_ambient().unwrap(), recomputes.read_ambient().unwrap());
-            let found = difference(&grid, scope, &opacity, &mask, &expected, &actual);
+            let found = difference(&grid, scope, &opacity, Recomputed::Mask(&mask), &expected, &actual);
             assert_eq!(found.different, 0, "seed {SEED} turn {turn} {clips:?}: {found:?}");
             assert_eq!(verify(&mut updates), found);
         }
@@ -354,7 +354,7 @@ fn planted_differences_are_all_reported() {
         let before = buffer(&gpu, "changed before", &vec![0; 4 * field.brick_count() as usize]);
         let which = if scope == Scope::All { Which::All } else { Which::Needed };
         run(&gpu, |rec| bricks.record(rec, field, which, &opacity, &mask, &before, &list).unwrap());
-        compare.run(&gpu, field, scope, &list, &opacity, &mask, &expected, &actual).unwrap()
+        compare.run(&gpu, field, scope, &list, &opacity, Recomputed::Mask(&mask), &expected, &actual).unwrap()
     };
     let mut random = Random::new(SEED);
     for grid in GRIDS {
@@ -375,7 +375,7 @@ fn planted_differences_are_all_reported() {
             }
             for scope in [Scope::All, Scope::Needed] {
                 let found = in_list(&field, scope, [&opacity, &expected, &actual], &mask);
-                let counted = difference(&grid, scope, &opacity, &mask, &expected, &actual);
+                let counted = difference(&grid, scope, &opacity, Recomputed::Mask(&mask), &expected, &actual);
                 assert_eq!(found, counted, "seed {SEED} {:?} turn {turn} {scope:?}", grid.dims);
             }
         }

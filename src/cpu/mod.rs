@@ -5,6 +5,7 @@
 
 pub mod bricks;
 pub mod classify;
+pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;
@@ -15,6 +16,7 @@ pub mod peel;
 pub mod raycast;
 pub mod reference;
 pub mod ssao;
+pub mod sweep;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
