@@ -17,6 +17,7 @@ use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
 use crate::method::{cao, lao};
 use crate::occlusion::Occlusion;
 use crate::scene::Method;
+use crate::stage::brick_distance::BrickDistance;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
 use crate::stage::compare::{Compare, Difference, Recomputed};
@@ -144,10 +145,19 @@ impl Held {
         }
     }
 
+    /// Bricks that can have opacity.
     fn occupancy(&self) -> &Buffer {
         match self {
             Self::Cast(cast) => &cast.1.occupancy,
             Self::Swept(swept) => &swept.1.occupancy,
+        }
+    }
+
+    /// What the clips do to each brick.
+    fn clip_bricks(&self) -> &Buffer {
+        match self {
+            Self::Cast(cast) => &cast.1.clip_bricks,
+            Self::Swept(swept) => &swept.1.clip_bricks,
         }
     }
 }
@@ -159,6 +169,9 @@ pub struct Renderer {
     held: Held,
     opacity: Opacity,
     occupancy: Occupancy,
+    brick_distance: BrickDistance,
+    /// How far rays may leap.
+    distances: Buffer,
     peel: Peel,
     dilate: Dilate,
     raycast: Raycast,
@@ -191,6 +204,8 @@ impl Renderer {
             held: Held::new(gpu, &field, &setup)?,
             opacity: Opacity::new(gpu)?,
             occupancy: Occupancy::new(gpu)?,
+            brick_distance: BrickDistance::new(gpu, &field)?,
+            distances: BrickDistance::buffer(gpu, &field)?,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,
             raycast: Raycast::new(gpu, colour)?,
@@ -329,6 +344,7 @@ impl Renderer {
                     self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
                     let (transfer, clips) = (&self.transfer_buffer, &self.clip_set);
                     sweep::record(rec, &self.field, kernels, volumes, transfer, clips, &self.edit())?;
+                    self.record_distances(rec)?;
                 }
             }
         }
@@ -356,6 +372,9 @@ impl Renderer {
                     let (gpu, field, edit) = (&self.gpu, &self.field, self.edit());
                     timings
                         .extend(sweep::run(gpu, field, kernels, volumes, transfer, clips, &edit, progress)?);
+                    let mut rec = gpu.recorder("distances")?;
+                    self.record_distances(&mut rec)?;
+                    timings.extend(rec.submit_and_wait()?);
                 }
             }
         }
@@ -373,6 +392,7 @@ impl Renderer {
         }
         if self.stale.ambient {
             self.record_clips(rec, kernels, volumes)?;
+            self.record_distances(rec)?;
             if self.setup.method == Method::Cao {
                 cao::record(rec, &self.field, kernels, volumes, &settings)?;
             } else {
@@ -408,6 +428,7 @@ impl Renderer {
         if self.stale.ambient {
             let mut rec = gpu.recorder("clips")?;
             self.record_clips(&mut rec, kernels, volumes)?;
+            self.record_distances(&mut rec)?;
             timings.extend(rec.submit_and_wait()?);
             timings.extend(if self.setup.method == Method::Cao {
                 cao::run(gpu, field, kernels, volumes, &settings, progress)?
@@ -490,6 +511,20 @@ impl Renderer {
         Ok(())
     }
 
+    /// How far rays may leap, after new occupancy or clips.
+    fn record_distances(&self, rec: &mut Recorder) -> Result<()> {
+        let (occupancy, clip_bricks) = (self.held.occupancy(), self.held.clip_bricks());
+        rec.barrier(
+            &[Access::StorageRead, Access::StorageWrite, Access::GraphicsRead],
+            &[Access::StorageRead, Access::StorageWrite],
+        );
+        rec.stage("distances")?;
+        self.brick_distance.record(rec, &self.field, occupancy, clip_bricks, &self.distances)?;
+        rec.end_stage()?;
+        rec.barrier(&[Access::StorageWrite], &[Access::GraphicsRead]);
+        Ok(())
+    }
+
     /// After a new V_PAO every brick of V_AO is out of date.
     fn record_all_changed(rec: &mut Recorder, volumes: &Volumes) -> Result<()> {
         rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
@@ -552,7 +587,7 @@ impl Renderer {
             transfer: &self.transfer_buffer,
             opacity: self.held.opacity(),
             ambient: self.held.ambient(),
-            occupancy: self.held.occupancy(),
+            distances: &self.distances,
             clips: &self.clip_set,
             frame: &self.frame,
         };

@@ -332,7 +332,7 @@ fn a_renderer_that_recomputes_agrees_with_one_that_updates() {
             let (opacity, mask) = (updates.read_opacity().unwrap(), updates.read_mask().unwrap());
             assert_eq!(recomputes.read_opacity().unwrap(), opacity);
             let (actual, expected) = (updates.read_ambient().unwrap(), recomputes.read_ambient().unwrap());
-            let found = difference(&grid, scope, &opacity, Recomputed::Mask(&mask), &expected, &actual);
+            let found = difference(&grid, scope, &opacity, &mask, &expected, &actual);
             assert_eq!(found.different, 0, "seed {SEED} turn {turn} {clips:?}: {found:?}");
             assert_eq!(verify(&mut updates), found);
         }
@@ -375,7 +375,7 @@ fn planted_differences_are_all_reported() {
             }
             for scope in [Scope::All, Scope::Needed] {
                 let found = in_list(&field, scope, [&opacity, &expected, &actual], &mask);
-                let counted = difference(&grid, scope, &opacity, Recomputed::Mask(&mask), &expected, &actual);
+                let counted = difference(&grid, scope, &opacity, &mask, &expected, &actual);
                 assert_eq!(found, counted, "seed {SEED} {:?} turn {turn} {scope:?}", grid.dims);
             }
         }

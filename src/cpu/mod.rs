@@ -3,13 +3,16 @@
 //! Written from the paper, not from the shaders; not tuned, and no fallback for a missing GPU. Each file opens with
 //! its equation. Geometry that decides visibility (shape distances, depth maps) is f32, as [`crate::clip`] defines it.
 
+pub mod brick_distance;
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;

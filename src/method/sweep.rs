@@ -32,7 +32,8 @@ pub struct SweptVolumes {
     pub todo: Buffer,
     /// Their number, one u32.
     pub count: Buffer,
-    clip_bricks: Buffer,
+    /// What the clips do to each brick, u32 each.
+    pub clip_bricks: Buffer,
     clip_bricks_before: Buffer,
     contact: Buffer,
     change: Buffer,

@@ -23,7 +23,7 @@ pub struct Volumes {
     pub ambient: Image,
     /// What the clips do to each brick, u32 each.
     pub clip_bricks: Buffer,
-    /// Bricks that the ray cast cannot skip, u32 each.
+    /// Bricks with opacity before clipping, u32 each.
     pub occupancy: Buffer,
     /// Bricks that the last contextual update changed, u32 each.
     pub changed_before: Buffer,

@@ -1,6 +1,7 @@
 //! The host side of each kernel: parameters, bindings, `record`. One file a kernel, named after it; each opens with the
 //! equation and its source, what goes in and out, and what it costs.
 
+pub mod brick_distance;
 pub mod bricks;
 pub mod carve;
 pub mod classify;

@@ -7,8 +7,8 @@
 use super::field::Field;
 use super::{device_buffer, row_of_groups};
 use crate::gpu::{
-    Access, Bind, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline, Recorder,
-    shaders,
+    Access, Bind, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse,
+    Pipeline, Recorder, Sampler, SamplerDesc, shaders,
 };
 use crate::layout_check;
 use crate::occlusion::{Integral, fibonacci};
@@ -28,15 +28,20 @@ struct Params {
     rule: u32,
     base: u32,
     count: u32,
-    pad: [u32; 2],
+    filtered: u32,
+    pad: u32,
 }
 layout_check!(Params => shaders::reference::REFERENCE_PARAMS {
-    dims, samples, per_mm, directions, first, step, exponent, rule, base, count
+    dims, samples, per_mm, directions, first, step, exponent, rule, base, count, filtered
 });
 
 /// The kernel `reference`.
 pub struct Reference {
     pipeline: Pipeline,
+    field: Sampler,
+    /// Whether the device's filter interpolates, which is faster, or the kernel. Filters of software drivers work in f32, those of
+    /// others in 8 bits, which is no truth; set accordingly at first.
+    pub filtered: bool,
 }
 
 /// Points to evaluate, the directions, and the values found.
@@ -141,7 +146,11 @@ fn clearance([nx, ny, nz]: [usize; 3], opacity: &[f32]) -> Vec<u8> {
 impl Reference {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::reference::SHADER, "main")? })
+        Ok(Self {
+            pipeline: gpu.compute(&shaders::reference::SHADER, "main")?,
+            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
+            filtered: gpu.info().kind == DeviceKind::Cpu,
+        })
     }
 
     /// Evaluates `count` points from `base` on. `field` is the opacity, `clearance` from [`upload_clearance`], both with
@@ -169,11 +178,13 @@ impl Reference {
             rule: integral.rule as u32,
             base,
             count,
-            pad: [0; 2],
+            filtered: u32::from(self.filtered),
+            pad: 0,
         };
         let binds = [
             ("opacity", Bind::Image(&field.volume)),
             ("clearance", Bind::Image(clearance)),
+            ("field", Bind::Sampler(&self.field)),
             ("directions", Bind::Buffer(&points.directions)),
             ("points", Bind::Buffer(&points.at)),
             ("found", Bind::Buffer(&points.found)),

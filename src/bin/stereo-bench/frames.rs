@@ -136,7 +136,9 @@ pub fn measure(
     plan: &Plan,
     progress: &mut dyn FnMut(),
 ) -> Result<Vec<Measured>> {
-    let target = Target::new(gpu, configuration)?;
+    let Configuration { size: [width, height], views, .. } = configuration;
+    let target = Target::new(gpu, configuration)
+        .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
     let mut subjects = Vec::new();
     for &method in &plan.methods {
         subjects.push(subject(gpu, configuration, plan, method).with_context(|| method.name())?);

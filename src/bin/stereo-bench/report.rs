@@ -48,9 +48,10 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         let _ = writeln!(text, "{}", row.trim_end());
     };
     line(format!(
-        "frames    {} for each method: {} runs of {}, methods in turn; {} before each run are not counted",
-        plan.runs * plan.frames,
+        "frames    {} for each method: {} run{} of {}, methods in turn; {} before each run are not counted",
+        u64::from(plan.runs) * u64::from(plan.frames),
         plan.runs,
+        if plan.runs == 1 { "" } else { "s" },
         plan.frames,
         plan.warm_up
     ));
@@ -71,9 +72,11 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
             m.method.name()
         ));
     }
-    line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
+    if all.iter().any(|m| m.method == Method::Lao) {
+        line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
+    }
     line(
-        "            affected: share of the voxels whose neighbourhood the clip changed, mean (its Table 2)"
+        "            affected: share of the voxels whose neighbourhood the clip changed, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
@@ -86,7 +89,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         });
         line(format!("{:<12}{}", m.method.name(), cells.map(|cell| format!("{cell:>20}")).concat()));
     }
-    line("            medians, and their share of the median frame (its Fig. 9)".into());
+    line("            medians, and their share of the median frame (the paper's Fig. 9)".into());
     if all.iter().any(|m| m.frames().any(|frame| frame.stages.is_empty())) {
         line("            this device has no timestamps: all of a frame is overhead".into());
     }
@@ -100,12 +103,12 @@ pub fn series_table<'a>(
     methods: &[Method],
 ) -> String {
     let heads: String = methods.iter().map(|method| format!("{:>13}", method.name())).collect();
-    let mut text = format!("\n{series:<16}{heads}  median frame, ms\n");
+    let mut text = format!("\n{:<16}{heads}\n", format!("{series}, ms"));
     for (value, all) in points {
         let cells: String = all.iter().map(|m| format!("{:>13.2}", median(&walls(m)))).collect();
         text += &format!("{value:<16}{cells}\n");
     }
-    text
+    text + "                medians of frames; the other settings as above\n"
 }
 
 /// One configuration.
