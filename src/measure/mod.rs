@@ -1,8 +1,9 @@
-//! Numbers in, numbers out: whether the claims hold, and how far results are from the truth.
+//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and which settings a budget affords.
 
 pub mod error;
 pub mod exactness;
 pub mod flip;
+pub mod planner;
 pub mod random;
 pub mod reference;
 pub mod ssim;

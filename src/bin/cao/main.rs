@@ -1,6 +1,7 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+mod budget;
 #[path = "../common/mod.rs"]
 mod common;
 mod devices;
