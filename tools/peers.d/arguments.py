@@ -10,19 +10,18 @@ from pathlib import Path
 USAGE = """\
 cao and VTK beside each other: tools/peers [VOLUME=builtin:engine:128] [options]
 
-Times after each move of a clip plane: VTK plain, with volumetric scattering, with
-screen-space occlusion; cao in solid colour, with full and with contextual updates. Same
-opacities, camera, light and step; rounds alternate. Then: how far VTK's occlusion differs
-between two eyes, and whether its shadows know of a clip. The first run downloads VTK
-(140 MB, into target/peers).
+Times both eyes after each move of a clip plane along the path of stereo-bench: VTK plain,
+with volumetric scattering, with screen-space occlusion; cao in solid colour, with full
+and with contextual updates. Same opacities, cameras, light and step; rounds alternate.
+Then: how far VTK's occlusion differs between the eyes, and whether its shadows know of a
+clip. The first run downloads VTK (140 MB, into target/peers).
 
   VOLUME            a file that cao reads, or builtin:NAME:SIZE
   --transfer T      opacity of its values: preset or TOML file    [default: auto]
   --size WxH        pixels of one eye                             [default: 512x512]
-  --step-mm S       between samples   [default: a quarter of the smallest spacing]
   --radius-mm R     of both occlusions    [default: 20 of the smallest spacing]
-  --rounds N        visits to each method                         [default: 5]
-  --moves N         of the clip plane in each visit               [default: 5]
+  --rounds N        visits to each system                         [default: 3]
+  --moves N         frames of a visit                             [default: 5]
   --json FILE       all numbers
   -o DIR            table.md, peers.json and the pictures
   --check           a small run that shows that everything works
@@ -86,9 +85,8 @@ def parse(arguments):
     parser.add_argument("volume", nargs="?", default="builtin:engine:128", type=volume)
     parser.add_argument("--transfer", default="auto")
     parser.add_argument("--size", default=(512, 512), type=size)
-    parser.add_argument("--step-mm", type=length)
     parser.add_argument("--radius-mm", type=length)
-    parser.add_argument("--rounds", default=5, type=count(1000))
+    parser.add_argument("--rounds", default=3, type=count(1000))
     parser.add_argument("--moves", default=5, type=count(1000))
     parser.add_argument("--json", type=output)
     parser.add_argument("-o", dest="folder", metavar="DIR", type=folder)

@@ -16,6 +16,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray, vtkUnsignedCharArray
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction, vtkPlane
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D, vtkProbeFilter
+from vtkmodules.vtkIOImage import vtkPNGReader, vtkPNGWriter
 from vtkmodules.vtkRenderingCore import (
     vtkActor,
     vtkColorTransferFunction,
@@ -46,8 +47,11 @@ MODES = {
 Eye = namedtuple("Eye", "position forward up fov_deg window_centre near far")
 
 
-def eyes(rig, aspect, depths):
-    """Left and right eye of a cao::view::StereoRig: parallel axes, fields of view shifted to the screen plane."""
+def eyes(rig, aspect, diagonal):
+    """Left and right eye of a cao::view::StereoRig: parallel axes, fields of view shifted to the screen plane.
+
+    Near and far plane lie close before and behind the volume, as VTK's own: its screen-space occlusion works on depths.
+    """
     position, target, up = (np.array(rig[k], float) for k in ("position_mm", "target_mm", "up"))
     ahead = target - position
     screen = float(np.linalg.norm(ahead))
@@ -55,11 +59,13 @@ def eyes(rig, aspect, depths):
     right = np.cross(ahead, up)
     right /= np.linalg.norm(right)
     slope = math.tan(math.radians(0.5 * rig["fov_deg"]))
+    centre = -float(position @ ahead)
+    near, far = max(centre - 0.55 * diagonal, 0.01 * diagonal), centre + 0.55 * diagonal
     pair = []
     for side in (-1.0, 1.0):
         shift = -side * 0.5 * rig["ipd_mm"] / screen
         at = position + right * (side * 0.5 * rig["ipd_mm"])
-        pair.append(Eye(at, ahead, np.cross(right, ahead), rig["fov_deg"], shift / (slope * aspect), *depths))
+        pair.append(Eye(at, ahead, np.cross(right, ahead), rig["fov_deg"], shift / (slope * aspect), near, far))
     return pair
 
 
@@ -74,17 +80,34 @@ def image_data(values, spacing):
     return image
 
 
-def piecewise(points):
-    function = vtkPiecewiseFunction()
-    for value, opacity in points:
-        function.AddPoint(value, opacity)
-    return function
+def read_png(path):
+    """[row from the top, column, rgb] 0 … 1."""
+    reader = vtkPNGReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    image = reader.GetOutput()
+    width, height, _ = image.GetDimensions()
+    return vtk_to_numpy(image.GetPointData().GetScalars()).reshape(height, width, -1)[::-1, :, :3] / 255.0
+
+
+def write_png(path, pixels):
+    """The reverse of read_png."""
+    height, width = pixels.shape[:2]
+    values = np.ascontiguousarray((255.0 * pixels[::-1] + 0.5).astype(np.uint8)).reshape(-1, 3)
+    image = vtkImageData()
+    image.SetDimensions(width, height, 1)
+    image.GetPointData().SetScalars(numpy_to_vtk(values, deep=True))
+    writer = vtkPNGWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(image)
+    writer.Write()
 
 
 class Window:
     """One off-screen window with a renderer, a directional light and the eyes' cameras."""
 
-    def __init__(self, size, light, background=(0.0, 0.0, 0.0)):
+    def __init__(self, size, background=(0.0, 0.0, 0.0), light=(0.0, 0.0, 1.0)):
+        """`background`: linear red, green, blue; `light`: direction towards it."""
         self.size = size
         self.renderer = vtkRenderer()
         self.renderer.SetBackground(*background)
@@ -102,12 +125,11 @@ class Window:
         self.window.SetSize(*size)
         self.window.AddRenderer(self.renderer)
 
-    def name(self):
-        """What draws: class of the window and OpenGL's own line about the driver."""
-        self.window.Render()
-        lines = self.window.ReportCapabilities().splitlines()
-        of = {k.strip(): v.strip() for k, _, v in (line.partition(":") for line in lines)}
-        return of.get("OpenGL renderer string", "?") + ", OpenGL " + of.get("OpenGL version string", "?")
+    def driver(self):
+        """What draws, in OpenGL's own words."""
+        lines = (line.partition(":") for line in self.window.ReportCapabilities().splitlines())
+        says = {key.strip(): value.strip() for key, _, value in lines}
+        return f"{says.get('OpenGL renderer string', '?')}, OpenGL {says.get('OpenGL version string', '?')}"
 
     def look_from(self, eye):
         camera = self.renderer.GetActiveCamera()
@@ -169,7 +191,10 @@ class VolumeView:
         self.mapper.SetSampleDistance(step)
         self.mapper.SetUseJittering(1)
         look = vtkVolumeProperty()
-        look.SetScalarOpacity(piecewise([(0.0, 0.0), (1.0, 1.0)]))
+        as_it_is = vtkPiecewiseFunction()
+        as_it_is.AddPoint(0.0, 0.0)
+        as_it_is.AddPoint(1.0, 1.0)
+        look.SetScalarOpacity(as_it_is)
         flat = vtkColorTransferFunction()
         flat.AddRGBPoint(0.0, *colour)
         look.SetColor(flat)
@@ -184,23 +209,24 @@ class VolumeView:
         volume.SetProperty(look)
         window.renderer.AddVolume(volume)
         self.plane = vtkPlane()
+        self.mapper.AddClippingPlane(self.plane)
+        self.clip(None)
 
     def set_mode(self, mode, radius):
         self.mapper.SetVolumetricScatteringBlending(0.0 if mode.reach is None else BLENDING)
         self.mapper.SetGlobalIlluminationReach(mode.reach or 0.0)
         self.window.set_ssao(mode.ssao, radius, self.diagonal)
 
-    def clip(self, point, normal):
-        """Hides the side of the plane that `normal` points to. VTK keeps the side of its normal."""
-        if self.mapper.GetClippingPlanes() is None:
-            self.mapper.AddClippingPlane(self.plane)
-        self.plane.SetOrigin(*point)
-        self.plane.SetNormal(*(-np.array(normal, float)))
+    def clip(self, plane):
+        """Hides the side of the plane that its normal points to; None hides nothing. VTK keeps the side of its normal."""
+        self.plane.SetOrigin(*(plane.point if plane else (2.0 * self.diagonal, 0.0, 0.0)))
+        self.plane.SetNormal(*(-plane.normal if plane else (-1.0, 0.0, 0.0)))
 
-    def frame(self, pair):
-        """Draws both eyes, one after the other as VTK's own stereo and OpenXR windows do; wall clock in ms."""
+    def frame(self, eyes, plane):
+        """Draws the eyes one after the other, as VTK's own stereo and OpenXR windows do; wall clock in ms."""
         begin = time.perf_counter()
-        for eye in pair:
+        self.clip(plane)
+        for eye in eyes:
             self.window.look_from(eye)
             self.window.draw()
         return 1e3 * (time.perf_counter() - begin)

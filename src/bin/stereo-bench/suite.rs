@@ -85,6 +85,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         "runs": plan.runs,
         "frames_a_run": plan.frames,
         "warm_up_frames": plan.warm_up,
+        "path": report::path_json(&base, &plan)?,
     }));
     out.json(report::as_json(&base, &results[0].1));
     let find = |wanted: &Configuration| -> &[Measured] {
