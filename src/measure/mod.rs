@@ -1,4 +1,8 @@
-//! Numbers in, numbers out: whether the claims hold.
+//! Numbers in, numbers out: whether the claims hold, and how far results are from the truth.
 
+pub mod error;
 pub mod exactness;
+pub mod flip;
 pub mod random;
+pub mod reference;
+pub mod ssim;

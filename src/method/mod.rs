@@ -2,5 +2,6 @@
 
 pub mod cao;
 pub mod lao;
-mod parts;
+pub mod parts;
+pub mod sweep;
 pub mod volumes;

@@ -129,7 +129,8 @@ pub struct Render {
     pub solid: bool,
     #[command(flatten)]
     pub settings: Settings,
-    /// cao computes only what the clips change; lao everything, for comparison [default: cao]
+    /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
+    /// comparison [default: cao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
     pub method: Option<Method>,
     #[command(flatten)]
@@ -153,7 +154,8 @@ pub struct Occlusion {
     pub mask_out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: Settings,
-    /// lao computes everything; cao first without clips, then only what the clips change [default: lao]
+    /// lao: every ray of every voxel; cao: first without clips, then only what the clips change; sweep: whole lines of voxels at once,
+    /// many times faster [default: lao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
     pub method: Option<Method>,
     /// Compute only voxels that a sample with opacity can touch; the others hold 1

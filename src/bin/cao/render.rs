@@ -93,8 +93,10 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     let s = &args.settings;
     let o = &mut scene.occlusion;
     o.rays = s.rays.unwrap_or(o.rays);
+    if let Some(method) = args.method.filter(|method| *method != o.method) {
+        (o.method, o.quadrature) = (method, method.quadrature());
+    }
     o.quadrature = s.quadrature.unwrap_or(o.quadrature);
-    o.method = args.method.unwrap_or(o.method);
     o.radius_mm = s.radius_mm.or(o.radius_mm);
     o.offset_mm = s.offset_mm.or(o.offset_mm);
     o.step_mm = s.step_mm.or(o.step_mm);

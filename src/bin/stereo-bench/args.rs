@@ -44,7 +44,7 @@ pub struct Cli {
     /// Write every frame as a line of comma-separated values
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
-    /// Keep the run in FOLDER/<date>-<device>: raw.csv, summary, README.md with command, versions and hardware
+    /// Keep the run in FOLDER/DATE-DEVICE: raw.csv, summary, README.md with command, versions and hardware
     /// [default of FOLDER: benches/runs]
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "benches/runs")]
     pub save: Option<PathBuf>,

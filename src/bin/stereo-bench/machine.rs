@@ -2,7 +2,8 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Processor, threads, memory and system in one line. Says "unknown processor" where the system does not tell as Linux does.
+/// Processor, threads, memory, system, and how many tasks compete for the processor now (the mean of the last minute), in one line.
+/// Says "unknown processor" where the system does not tell as Linux does.
 pub fn describe() -> String {
     let first = |file: &str, key: &str| {
         let text = std::fs::read_to_string(file).unwrap_or_default();
@@ -14,7 +15,10 @@ pub fn describe() -> String {
     let kib =
         first("/proc/meminfo", "MemTotal").and_then(|value| value.split(' ').next()?.parse::<f64>().ok());
     let memory = kib.map(|kib| format!(", {:.0} GiB", kib / 1048576.0)).unwrap_or_default();
-    format!("{processor}, {threads} threads{memory}, {} {}", std::env::consts::OS, std::env::consts::ARCH)
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = load.split(' ').next().filter(|n| !n.is_empty()).map(|n| format!(", load {n} at the start"));
+    let (system, kind) = (std::env::consts::OS, std::env::consts::ARCH);
+    format!("{processor}, {threads} threads{memory}, {system} {kind}{}", load.unwrap_or_default())
 }
 
 /// Today in UTC as `[year, month, day]`.

@@ -4,6 +4,7 @@ use super::frames::{Configuration, Frame, Measured, PARTS, Plan};
 use super::method::Method;
 use super::path;
 use super::statistics::{median, percentile};
+use super::suite::Outcome;
 use anyhow::Result;
 use cao::view::View;
 use serde_json::{Map, Value, json};
@@ -51,9 +52,10 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         let _ = writeln!(text, "{}", row.trim_end());
     };
     line(format!(
-        "frames    {} for each method: {} runs of {}, methods in turn; {} before each run are not counted",
-        plan.runs * plan.frames,
+        "frames    {} for each method: {} run{} of {}, methods in turn; {} before each run are not counted",
+        u64::from(plan.runs) * u64::from(plan.frames),
         plan.runs,
+        if plan.runs == 1 { "" } else { "s" },
         plan.frames,
         plan.warm_up
     ));
@@ -74,9 +76,11 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
             m.method.name()
         ));
     }
-    line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
+    if all.iter().any(|m| m.method == Method::Lao) {
+        line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
+    }
     line(
-        "            affected: share of the voxels whose neighbourhood the clip changed, mean (its Table 2)"
+        "            affected: share of the voxels whose neighbourhood the clip changed, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
@@ -89,26 +93,31 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         });
         line(format!("{:<12}{}", m.method.name(), cells.map(|cell| format!("{cell:>20}")).concat()));
     }
-    line("            medians, and their share of the median frame (its Fig. 9)".into());
+    line("            medians, and their share of the median frame (the paper's Fig. 9)".into());
     if all.iter().any(|m| m.frames().any(|frame| frame.stages.is_empty())) {
         line("            this device has no timestamps: all of a frame is overhead".into());
     }
     text
 }
 
-/// One series: median frame times, one line a value.
-pub fn series_table<'a>(
-    series: &str,
-    points: impl Iterator<Item = (&'a str, &'a [Measured])>,
-    methods: &[Method],
-) -> String {
-    let heads: String = methods.iter().map(|method| format!("{:>13}", method.name())).collect();
-    let mut text = format!("\n{series:<16}{heads}  median frame, ms\n");
-    for (value, all) in points {
-        let cells: String = all.iter().map(|m| format!("{:>13.2}", median(&walls(m)))).collect();
-        text += &format!("{value:<16}{cells}\n");
+/// Median over the frames of a method's time here over its time there: the two took turns.
+fn growth(here: &Measured, there: &Measured) -> f64 {
+    median(&here.frames().zip(there.frames()).map(|(here, there)| here.wall / there.wall).collect::<Vec<_>>())
+}
+
+/// One series: median frame times, one line a value, and how many times those of the first value they are.
+pub fn series_table(points: &[Outcome]) -> String {
+    let Some(first) = points.first() else { return String::new() };
+    let heads: String = first.measured.iter().map(|m| format!("{:>22}", m.method.name())).collect();
+    let mut text = format!("\n{:<14}{heads}\n", format!("{}, ms", first.series));
+    for point in points {
+        let cells = point.measured.iter().zip(&first.measured).map(|(m, first)| {
+            let growth = format!("(x {:.2})", growth(m, first));
+            format!("{:>11.2} {growth:>10}", median(&walls(m)))
+        });
+        text += &format!("{:<14}{}\n", point.value, cells.collect::<String>());
     }
-    text
+    text + "              medians of frames, and of their ratios to the first line's; all take turns\n"
 }
 
 /// What the counted frames show, for whoever draws the same with another program: eyes and clip of each, light, step.
@@ -150,10 +159,15 @@ fn view_json(view: &View) -> Value {
     })
 }
 
-/// One configuration.
-pub fn as_json(c: &Configuration, all: &[Measured]) -> Value {
+/// One configuration and its methods; in a series with its value and the growth since the series' first.
+pub fn as_json(result: &Outcome, first: Option<&Outcome>) -> Value {
+    let (c, all) = (&result.configuration, &result.measured);
     let o = c.setup.occlusion;
-    json!({
+    let mut methods: Vec<Value> = all.iter().map(|m| method_json(m, all)).collect();
+    for ((method, m), first) in methods.iter_mut().zip(all).zip(first.iter().flat_map(|f| &f.measured)) {
+        method["over_first_of_series"] = growth(m, first).into();
+    }
+    let mut json = json!({
         "volume": c.input.name,
         "dims": c.input.volume.dims,
         "rays": o.rays.name(),
@@ -161,8 +175,12 @@ pub fn as_json(c: &Configuration, all: &[Measured]) -> Value {
         "radius_mm": o.radius_mm,
         "view_size": c.size,
         "views": c.views,
-        "methods": all.iter().map(|m| method_json(m, all)).collect::<Vec<_>>(),
-    })
+        "methods": methods,
+    });
+    if first.is_some() {
+        json["value"] = result.value.as_str().into();
+    }
+    json
 }
 
 fn method_json(m: &Measured, all: &[Measured]) -> Value {

@@ -6,39 +6,58 @@ use cao::gpu::Gpu;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Makes the run's own folder in `folder`: `<date>-<device>`, with a number where that is taken. Before anything long begins, so
-/// that what cannot be written is known early.
-pub fn folder(folder: &Path, gpu: &Gpu) -> Result<PathBuf> {
-    let [year, month, day] = machine::today();
-    let name = format!("{year:04}-{month:02}-{day:02}-{}", plain(&gpu.info().name));
-    fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    for n in 1.. {
-        let path = folder.join(if n == 1 { name.clone() } else { format!("{name}-{n}") });
-        match fs::create_dir(&path) {
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => continue,
-            made => {
-                made.with_context(|| format!("cannot make the folder {}", path.display()))?;
-                return Ok(path);
+/// A run's own folder.
+pub struct Folder(PathBuf);
+
+impl Folder {
+    /// Makes it in `parent`: `<date>-<device>`, with a number where that is taken. Before anything long begins, so that what cannot
+    /// be written is known early.
+    pub fn new(parent: &Path, gpu: &Gpu) -> Result<Self> {
+        let [year, month, day] = machine::today();
+        let name = format!("{year:04}-{month:02}-{day:02}-{}", plain(&gpu.info().name));
+        fs::create_dir_all(parent).with_context(|| format!("cannot make the folder {}", parent.display()))?;
+        let mut path = parent.join(&name);
+        let mut number = 1;
+        loop {
+            match fs::create_dir(&path) {
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                    number += 1;
+                    path = parent.join(format!("{name}-{number}"));
+                }
+                made => {
+                    made.with_context(|| format!("cannot make the folder {}", path.display()))?;
+                    return Ok(Self(path));
+                }
             }
         }
     }
-    unreachable!("numbers do not end")
+
+    /// Writes the three files and returns their paths; `machine` describes it as the run began.
+    pub fn write(&self, gpu: &Gpu, machine: &str, csv: &str, summary: &str) -> Result<Vec<PathBuf>> {
+        let files = [
+            ("raw.csv", csv.to_owned()),
+            ("summary", summary.to_owned()),
+            ("README.md", readme(gpu, machine)),
+        ];
+        files
+            .into_iter()
+            .map(|(name, text)| {
+                let path = self.0.join(name);
+                fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+                Ok(path)
+            })
+            .collect()
+    }
 }
 
-/// Writes the three files and returns their paths.
-pub fn write(folder: &Path, gpu: &Gpu, csv: &str, summary: &str) -> Result<Vec<PathBuf>> {
-    let files = [("raw.csv", csv.to_owned()), ("summary", summary.to_owned()), ("README.md", readme(gpu))];
-    files
-        .into_iter()
-        .map(|(name, text)| {
-            let path = folder.join(name);
-            fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-            Ok(path)
-        })
-        .collect()
+impl Drop for Folder {
+    /// A run that failed leaves no empty folder; one that holds anything cannot be removed so.
+    fn drop(&mut self) {
+        let _ = fs::remove_dir(&self.0);
+    }
 }
 
-fn readme(gpu: &Gpu) -> String {
+fn readme(gpu: &Gpu, machine: &str) -> String {
     let info = gpu.info();
     let [major, minor, patch] = info.api_version;
     let [year, month, day] = machine::today();
@@ -57,7 +76,7 @@ fn readme(gpu: &Gpu) -> String {
         env!("CARGO_PKG_VERSION"),
         info.name,
         info.driver,
-        machine::describe(),
+        machine,
     )
 }
 

@@ -1,4 +1,4 @@
-//! Series: one setting varied while the others stay.
+//! Series: one setting varied while the others stay. All points of a series take turns, as the methods do.
 
 use super::common::args::usage;
 use super::frames::{Configuration, Input};
@@ -43,8 +43,7 @@ impl Series {
         found.ok_or_else(|| format!("expected one of {}", Self::ALL.map(Self::name).join(", ")))
     }
 
-    /// The values, each in words, and the configuration that differs from `base` in nothing else. `transfer` is what the user
-    /// asked for, `source` the volume's name.
+    /// The values, each in words, and the configuration that differs from `base` in nothing else. `transfer` is what the user asked for.
     pub fn configurations(
         self,
         base: &Configuration,
@@ -97,8 +96,9 @@ fn resized(base: &Configuration, share: f64, transfer: &str) -> Result<(String, 
     }
     let volume = builtin_box(scene, dims, volume.spacing)?;
     let transfer = TransferFunction::load(transfer, volume.range())?;
-    let ([x, y, z], [sx, sy, sz]) = (dims, volume.spacing);
-    let name = format!("builtin:{scene}:{x}x{y}x{z}:{sx},{sy},{sz}");
+    let [sx, sy, sz] = volume.spacing;
+    let spacing = if volume.spacing == [1.0; 3] { String::new() } else { format!(":{sx},{sy},{sz}") };
+    let name = format!("builtin:{scene}:{}{spacing}", in_words(dims));
     Ok((in_words(dims), Configuration { input: Rc::new(Input { name, volume, transfer }), ..base.clone() }))
 }
 

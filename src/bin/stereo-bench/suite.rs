@@ -5,13 +5,14 @@ use super::common::args::{open, setup, shape, usage};
 use super::common::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use super::frames::{Configuration, Input, Measured, Plan, measure};
 use super::path::PERIOD;
-use super::{csv, machine, report, save};
+use super::save::Folder;
+use super::{csv, machine, report};
 use anyhow::{Context, Result};
-use cao::gpu::{DeviceKind, Gpu};
+use cao::gpu::DeviceKind;
 use cao::scene::Method;
 use cao::transfer::TransferFunction;
 use serde_json::{Map, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 
@@ -21,26 +22,13 @@ const SOFTWARE_FRAMES: u32 = 10;
 pub fn run(cli: &Cli) -> Result<ExitCode> {
     let transfer = cli.settings.transfer.as_deref().unwrap_or("auto");
     let inputs = [cli.input.as_str(), transfer, &cli.clip];
-    let targets: Vec<&Path> = cli.csv.iter().map(|path| path.as_path()).collect();
+    let targets: Vec<&Path> = cli.csv.iter().map(PathBuf::as_path).collect();
     check_targets(&targets, "csv", inputs.into_iter().map(Path::new))?;
     let mut plan = plan(cli)?;
     let mut progress = Progress::new();
     progress.stage("reading");
     let base = base(cli, transfer)?;
-    let mut series = Vec::new();
-    for &one in &cli.scale {
-        if series.iter().any(|(name, _)| *name == one.name()) {
-            return Err(usage(format!("--scale: {} is given twice", one.name())));
-        }
-        series.push((one.name(), one.configurations(&base, transfer)?));
-    }
-    // What several series share is measured once.
-    let mut wanted = vec![base.clone()];
-    for (_, configuration) in series.iter().flat_map(|(_, points)| points) {
-        if !wanted.contains(configuration) {
-            wanted.push(configuration.clone());
-        }
-    }
+    let groups = groups(cli, base, transfer)?;
 
     progress.stage("preparing");
     let gpu = open_gpu(&cli.global)?;
@@ -49,66 +37,111 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         DeviceKind::Cpu => SOFTWARE_FRAMES,
         _ => PERIOD,
     });
-    let kept = cli.save.as_deref().map(|folder| save::folder(folder, &gpu)).transpose()?;
+    let kept = cli.save.as_deref().map(|folder| Folder::new(folder, &gpu)).transpose()?;
+    let machine = machine::describe();
     progress.stage("measuring");
-    let total = plan.total() * wanted.len() as u64;
+    let points: usize = groups.iter().map(|group| group.points.len()).sum();
+    let total = plan.total() * points as u64;
     let mut done = 0;
     let mut results = Vec::new();
-    for configuration in wanted {
-        let measured = measure(&gpu, &configuration, &plan, &mut || {
+    for Group { series, points } in groups {
+        let (values, configurations): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        let measured = measure(&gpu, &configurations, &plan, &mut || {
             done += 1;
             progress.set(done as f64 / total as f64);
         })?;
-        results.push((configuration, measured));
+        let points = values.into_iter().zip(configurations).zip(measured);
+        results.extend(points.map(|((value, configuration), measured)| Outcome {
+            series,
+            value,
+            configuration,
+            measured,
+        }));
     }
     check_validation(&gpu)?;
     drop(progress);
 
     let mut out = Out::new(&cli.global);
-    let machine = machine::describe();
     out.device(&gpu);
     out.line(format!("machine   {machine}"));
-    out.volume(&base.input.name, &base.input.volume);
-    out.occlusion(
-        &plan.methods.iter().map(|m| m.name()).collect::<Vec<_>>().join(" "),
-        &base.setup,
-        &base.input.volume,
-    );
-    out.line(format!("views     {} of {} x {} pixels, in one pass", base.views, base.size[0], base.size[1]));
+    out.json(json!({ "machine": machine, "version": env!("CARGO_PKG_VERSION") }));
+    say(cli, &mut out, &plan, &results);
+    if let Some(base) = results.first() {
+        out.json(json!({ "path": report::path_json(&base.configuration, &plan)? }));
+    }
+    let (table, summary) = (csv::table(&results), out.text().to_owned());
+    if let Some(path) = &cli.csv {
+        std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;
+        out.wrote(path);
+    }
+    if let Some(folder) = kept {
+        for path in folder.write(&gpu, &machine, &table, &summary)? {
+            out.wrote(&path);
+        }
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What was measured in which way, then the numbers: of the base configuration, which comes first, and of every series.
+fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
+    let Some((base, series)) = results.split_first() else { return };
+    let Configuration { input, setup, size, views } = &base.configuration;
+    let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
+    out.volume(&input.name, &input.volume);
+    out.occlusion(&methods.join(" "), setup, &input.volume);
+    out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
     out.line(format!("clip      {}", cli.clip));
-    out.line(report::tables(&plan, &results[0].1).trim_end());
+    out.line(match cli.all_voxels {
+        true => "voxels    all",
+        false => "voxels    those that a sample with opacity can touch",
+    });
+    out.line(report::tables(plan, &base.measured).trim_end());
     out.json(json!({
-        "machine": machine,
-        "version": env!("CARGO_PKG_VERSION"),
         "clip": cli.clip,
         "all_voxels": cli.all_voxels,
         "runs": plan.runs,
         "frames_a_run": plan.frames,
         "warm_up_frames": plan.warm_up,
-        "path": report::path_json(&base, &plan)?,
     }));
-    out.json(report::as_json(&base, &results[0].1));
-    let find = |wanted: &Configuration| -> &[Measured] {
-        results
-            .iter()
-            .find(|(configuration, _)| configuration == wanted)
-            .map_or(&[], |(_, measured)| measured)
-    };
+    out.json(report::as_json(base, None));
     let mut scale = Map::new();
-    for (name, points) in &series {
-        let measured = points.iter().map(|(value, configuration)| (value.as_str(), find(configuration)));
-        out.line(report::series_table(name, measured, &plan.methods).trim_end_matches('\n'));
-        let values = points.iter().map(|(value, configuration)| {
-            let mut point = report::as_json(configuration, find(configuration));
-            point["value"] = value.as_str().into();
-            point
-        });
-        scale.insert((*name).into(), values.collect());
+    for points in series.chunk_by(|a, b| a.series == b.series) {
+        out.line(report::series_table(points).trim_end_matches('\n'));
+        let values = points.iter().map(|point| report::as_json(point, points.first()));
+        scale.insert(points[0].series.into(), values.collect());
     }
     out.json(json!({ "scale": scale }));
-    write(cli, &mut out, &results, kept.as_deref(), &gpu)?;
-    out.finish()?;
-    Ok(ExitCode::SUCCESS)
+}
+
+/// One configuration with what was measured.
+pub struct Outcome {
+    /// Name of the series; "base" for what the command line says.
+    pub series: &'static str,
+    /// What is varied, in words.
+    pub value: String,
+    pub configuration: Configuration,
+    /// In the order of the methods.
+    pub measured: Vec<Measured>,
+}
+
+/// Configurations that take turns.
+struct Group {
+    series: &'static str,
+    /// The value of what is varied, in words, and the configuration.
+    points: Vec<(String, Configuration)>,
+}
+
+/// The base configuration by itself, then every series.
+fn groups(cli: &Cli, base: Configuration, transfer: &str) -> Result<Vec<Group>> {
+    let mut groups = vec![Group { series: "base", points: vec![(String::new(), base.clone())] }];
+    for series in &cli.scale {
+        if groups.iter().any(|group| group.series == series.name()) {
+            return Err(usage(format!("--scale: {} is given twice", series.name())));
+        }
+        groups.push(Group { series: series.name(), points: series.configurations(&base, transfer)? });
+    }
+    Ok(groups)
 }
 
 fn plan(cli: &Cli) -> Result<Plan> {
@@ -131,29 +164,4 @@ fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     let transfer = TransferFunction::load(transfer, volume.range())?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
-}
-
-/// The files that the user asked for.
-fn write(
-    cli: &Cli,
-    out: &mut Out,
-    results: &[(Configuration, Vec<Measured>)],
-    kept: Option<&Path>,
-    gpu: &Gpu,
-) -> Result<()> {
-    if cli.csv.is_none() && kept.is_none() {
-        return Ok(());
-    }
-    let table = csv::table(results);
-    let summary = out.text().to_owned();
-    if let Some(path) = &cli.csv {
-        std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;
-        out.wrote(path);
-    }
-    if let Some(folder) = kept {
-        for path in save::write(folder, gpu, &table, &summary)? {
-            out.wrote(&path);
-        }
-    }
-    Ok(())
 }
