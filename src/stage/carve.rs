@@ -69,7 +69,6 @@ impl Carve {
 
     /// Brings V_o up to date: every brick if `all`, those that clips can have changed otherwise. `positions` are those of
     /// [`Classify`].
-    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
     pub fn record(
         &self,
         rec: &mut Recorder,
