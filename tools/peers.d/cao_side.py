@@ -131,7 +131,7 @@ class Scene:
         lines = [f"volume = {json.dumps(str(self.path))}", "[transfer]", transfer(self.reference)]
         if plane:
             lines += ["[[clip]]", 'shape = "plane"', f"translate_mm = {plane.point}", f"rotate_deg = {plane.rotate_deg}"]
-        lines += ["[occlusion]", f'method = "{"lao" if method == "lao" else "cao"}"', f"radius_mm = {self.radius}"]
+        lines += ["[occlusion]", f'method = "{"cao" if method == "solid" else method}"', f"radius_mm = {self.radius}"]
         lines += ["[stereo]", *(f"{key} = {value}" for key, value in rig.items())]
         lines += ["[image]", f"width = {self.size[0]}", f"height = {self.size[1]}"]
         lines += [f"step_mm = {self.look['step_mm']}", f'background = "{BACKGROUND}"', "[shading]"]

@@ -15,7 +15,12 @@ from arguments import parse
 from cao_side import BACKGROUND, COLOUR, Plane, Scene, bench, cao, linear, read_nrrd, rig_of, srgb, stop, transfer, write_nrrd
 from vtkmodules.vtkCommonCore import vtkVersion
 
-OURS = {"solid": "solid colour", "lao": "LAO, full update", "cao": "CAO, contextual update"}
+OURS = {
+    "solid": "solid colour",
+    "lao": "LAO, full update",
+    "cao": "CAO, contextual update",
+    "sweep": "line sweeps, contextual update",
+}
 # The isosurface whose screen-space occlusion is compared between the eyes: half of full opacity.
 LEVEL = 0.5
 # What a picture shows differs at least so much from the background, of 1: about twice its brightness.
