@@ -14,7 +14,7 @@ pub struct Cli {
     #[arg(default_value = "builtin:engine:128")]
     pub input: String,
     /// Methods, which take turns frame by frame. solid: no occlusion; lao: computed anew in every frame; cao: what the clip changed;
-    /// cao-literal: the paper's recipe to the letter
+    /// cao-literal: the paper's recipe to the letter; sweep: line sweeps by the rule `segment`, what the clip changed
     #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Method::parse, default_values_t = Method::ALL)]
     pub methods: Vec<Method>,
     /// Pixels of one view

@@ -80,7 +80,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
-        "            affected: share of the voxels whose neighbourhood the clip changed, mean (the paper's Table 2)"
+        "            affected: share of the voxels near what the clip changed, of sweeps in whole bricks, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
@@ -163,7 +163,7 @@ fn view_json(view: &View) -> Value {
 pub fn as_json(result: &Outcome, first: Option<&Outcome>) -> Value {
     let (c, all) = (&result.configuration, &result.measured);
     let o = c.setup.occlusion;
-    let mut methods: Vec<Value> = all.iter().map(|m| method_json(m, all)).collect();
+    let mut methods: Vec<Value> = all.iter().map(|m| method_json(c, m, all)).collect();
     for ((method, m), first) in methods.iter_mut().zip(all).zip(first.iter().flat_map(|f| &f.measured)) {
         method["over_first_of_series"] = growth(m, first).into();
     }
@@ -171,7 +171,6 @@ pub fn as_json(result: &Outcome, first: Option<&Outcome>) -> Value {
         "volume": c.input.name,
         "dims": c.input.volume.dims,
         "rays": o.rays.name(),
-        "quadrature": o.quadrature.name(),
         "radius_mm": o.radius_mm,
         "view_size": c.size,
         "views": c.views,
@@ -183,12 +182,13 @@ pub fn as_json(result: &Outcome, first: Option<&Outcome>) -> Value {
     json
 }
 
-fn method_json(m: &Measured, all: &[Measured]) -> Value {
+fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
     let walls = walls(m);
     let parts: Map<String, Value> =
         PARTS.iter().enumerate().map(|(n, name)| (name.replace(' ', "_"), part(m, n).into())).collect();
     json!({
         "method": m.method.name(),
+        "quadrature": m.method.setup(c.setup).occlusion.quadrature.name(),
         "frames": walls.len(),
         "median_ms": median(&walls),
         "p95_ms": percentile(&walls, 95.0),

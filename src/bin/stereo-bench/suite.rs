@@ -4,12 +4,13 @@ use super::args::Cli;
 use super::common::args::{open, setup, shape, usage};
 use super::common::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use super::frames::{Configuration, Input, Measured, Plan, measure};
+use super::method::Method;
 use super::path::PERIOD;
 use super::save::Folder;
 use super::{csv, machine, report};
 use anyhow::{Context, Result};
 use cao::gpu::DeviceKind;
-use cao::scene::Method;
+use cao::scene;
 use cao::transfer::TransferFunction;
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
@@ -90,6 +91,13 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
+    if plan.methods.contains(&Method::Sweep) {
+        let (o, spacing) = (Method::Sweep.setup(*setup).occlusion, input.volume.min_spacing());
+        let (rule, step, from) = (o.quadrature.name(), o.lattice_step(spacing), o.lattice_offset(spacing));
+        out.line(format!(
+            "          of sweeps quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
+        ));
+    }
     out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
     out.line(format!("clip      {}", cli.clip));
     out.line(match cli.all_voxels {
@@ -160,7 +168,7 @@ fn plan(cli: &Cli) -> Result<Plan> {
 
 fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
-    let setup = setup(&cli.settings, &volume, Method::Cao, cli.all_voxels)?;
+    let setup = setup(&cli.settings, &volume, scene::Method::Cao, cli.all_voxels)?;
     let transfer = TransferFunction::load(transfer, volume.range())?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
