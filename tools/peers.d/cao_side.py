@@ -5,19 +5,14 @@ import json
 import math
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
+from terminal import stop
 
 # One colour for all: the volume that both systems read is one of opacities. sRGB.
 COLOUR = "#e6d9c4"
 BACKGROUND = "#17191d"
-
-
-def stop(message):
-    print(f"peers: {message}", file=sys.stderr)
-    sys.exit(1)
 
 
 def run(program, *arguments):

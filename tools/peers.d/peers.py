@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import vtk_side as vtk
 from arguments import parse
-from cao_side import BACKGROUND, COLOUR, Plane, Scene, bench, cao, linear, read_nrrd, rig_of, srgb, stop, transfer, write_nrrd
+from cao_side import BACKGROUND, COLOUR, Plane, Scene, bench, cao, linear, read_nrrd, rig_of, srgb, transfer, write_nrrd
+from terminal import progress, stop
 from vtkmodules.vtkCommonCore import vtkVersion
 
 OURS = {
@@ -43,12 +44,6 @@ NOTES = [
     "Reach is VTK's GlobalIlluminationReach: from 0, one step towards the light, to 1, through the whole volume.",
     "VTK shades a cut face inside uniform material with its ambient part alone, for it finds no gradient there.",
 ]
-
-
-def progress(text=""):
-    """One line on a terminal, nothing in a pipe."""
-    if sys.stderr.isatty():
-        print(f"\r\033[K{text}", end="", file=sys.stderr, flush=True)
 
 
 def spread(values):
@@ -235,7 +230,11 @@ def clip_shadow(size, pixels, look, folder):
         ("VTK", "cropping box"): theirs("whole", box=True),
         ("VTK", "nothing clipped"): theirs("whole"),
     }
-    for what, name, cut in (("data removed", "removed", None), ("clip plane", "whole", plane), ("nothing clipped", "whole", None)):
+    for what, name, cut in (
+        ("data removed", "removed", None),
+        ("clip plane", "whole", plane),
+        ("nothing clipped", "whole", None),
+    ):
         pictures["cao", what] = vtk.read_png(scenes[name].draw(rig, cut, "cao"))
     rows = []
     for (system, what), picture in pictures.items():
@@ -262,7 +261,8 @@ def tables(found):
     stereo, shadow = found["stereo"], found["clip_shadow"]
     return "\n".join([
         f"{found['volume']}, {dims} voxels; both eyes, {size} pixels each, a sample every {found['step_mm']:g} mm, "
-        f"occlusion within {found['radius_mm']:g} mm; after every move of a clip plane, {found['rounds']} rounds of {found['moves']}.",
+        f"occlusion within {found['radius_mm']:g} mm; after every move of a clip plane, "
+        f"{found['rounds']} x {found['moves']} frames.",
         "",
         found["machine"],
         "",
@@ -388,4 +388,8 @@ def main():
         stop("these numbers mean nothing: " + "; ".join(problems))
 
 
-main()
+try:
+    main()
+except KeyboardInterrupt:
+    progress()
+    sys.exit(130)

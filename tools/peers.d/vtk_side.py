@@ -30,7 +30,7 @@ from vtkmodules.vtkRenderingCore import (
 from vtkmodules.vtkRenderingOpenGL2 import vtkRenderStepsPass, vtkSSAOPass, vtkTextureObject
 from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
-# Share of scattering in the light: 1 is half shading by gradients, half scattering (vtkVolumeMapper's own scale is 0 … 2).
+# VolumetricScatteringBlending, 0 … 2. At 1 light scatters where gradients are weak, and where they are strong surfaces are shaded.
 BLENDING = 1.0
 # SSAO as 3D Slicer sets it, but for the radius: bias in units of the volume's diagonal, samples, blur.
 SSAO_BIAS = 0.001
@@ -40,8 +40,8 @@ MODES = {
     "plain": Mode("plain volume rendering", None, None),
     "scattering-0": Mode("volumetric scattering, reach 0", 0.0, None),
     "scattering-1": Mode("volumetric scattering, reach 1", 1.0, None),
-    "ssao-32": Mode("SSAO, 32 samples (VTK's default)", None, 32),
-    "ssao-320": Mode("SSAO, 320 samples (3D Slicer's)", None, 320),
+    "ssao-32": Mode("SSAO, 32 samples (VTK's default), blurred", None, 32),
+    "ssao-320": Mode("SSAO, 320 samples (3D Slicer's), blurred", None, 320),
 }
 
 Eye = namedtuple("Eye", "position forward up fov_deg window_centre near far")
