@@ -84,7 +84,7 @@ const MAX_SAMPLES: f32 = 1e5;
 
 /// The distance between samples in mm, refused where a ray along the volume's diagonal would take too many.
 fn checked_step(field: &Field, look: &Look) -> Result<f32> {
-    let step = look.step_mm.unwrap_or(0.25 * field.min_spacing());
+    let step = look.step(field.min_spacing());
     let size = Vec3::from_array(std::array::from_fn(|i| field.dims[i] as f32 * field.spacing[i]));
     let samples = size.length() / step;
     if samples <= MAX_SAMPLES {
@@ -118,6 +118,11 @@ impl Look {
     fn remainder(&self) -> f32 {
         let brightest = (self.ambient + self.diffuse) * if self.occluded { self.gain } else { 1.0 };
         self.tolerance / 255.0 / brightest.max(1.0)
+    }
+
+    /// The distance between samples in mm, for a volume whose smallest spacing is `min_spacing` mm.
+    pub fn step(&self, min_spacing: f32) -> f32 {
+        self.step_mm.unwrap_or(0.25 * min_spacing)
     }
 
     fn check(&self) -> Result<()> {
