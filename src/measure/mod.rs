@@ -1,4 +1,5 @@
 //! Numbers in, numbers out: whether the claims hold.
 
 pub mod exactness;
+pub mod plot;
 pub mod random;
