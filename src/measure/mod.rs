@@ -1,6 +1,9 @@
-//! Numbers in, numbers out: whether the claims hold.
+//! Numbers in, numbers out: whether the claims hold, and how far results are from the truth.
 
 pub mod contender;
+pub mod error;
 pub mod exactness;
 pub mod plot;
 pub mod random;
+pub mod reference;
+pub mod ssim;

@@ -15,6 +15,7 @@ pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod ssao;
+pub mod reference;
 pub mod transfer;
 
 use crate::Result;
