@@ -1,5 +1,6 @@
 //! Numbers in, numbers out: whether the claims hold, and how far results are from the truth.
 
+pub mod chart;
 pub mod contender;
 pub mod error;
 pub mod exactness;

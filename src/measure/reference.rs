@@ -89,6 +89,26 @@ pub fn literal(
     volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
 }
 
+/// The ambient reference at points of the volume, in index coordinates, rather than at its voxels; no voxels are left out and none is
+/// computed twice. As [`ambient`] otherwise.
+#[expect(clippy::too_many_arguments, reason = "volume, lengths and settings, each named once")]
+pub fn ambient_at(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    points: &[[f64; 3]],
+    radius_mm: f64,
+    offset_mm: f64,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<f32>> {
+    let integral =
+        Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, grid.min_spacing());
+    let scene = Scene::new(gpu, grid, opacity)?;
+    Ok(scene.evaluate(points, &integral, reference_mm, progress)?.0)
+}
+
 fn volume(
     gpu: &Gpu,
     grid: &Grid,

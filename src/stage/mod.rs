@@ -14,8 +14,8 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
-pub mod ssao;
 pub mod reference;
+pub mod ssao;
 pub mod transfer;
 
 use crate::Result;
