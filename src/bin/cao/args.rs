@@ -212,6 +212,9 @@ pub struct Chart {
     /// Fewer settings, smaller built-in scenes, a coarser reference
     #[arg(long)]
     pub quick: bool,
+    /// A peers.json of tools/peers, for a table of other systems in the report
+    #[arg(long, value_name = "FILE")]
+    pub peers: Option<PathBuf>,
     /// Timed runs of every method and change
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub runs: u32,

@@ -3,7 +3,8 @@
 use crate::args::{self, Chart as Args, Global, usage};
 use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::{Context, Result};
-use cao::measure::chart::{self, Chart, Plan, Scene, csv, draw};
+use cao::measure::chart::peers::Peers;
+use cao::measure::chart::{self, Chart, Plan, Scene, csv, draw, report};
 use cao::measure::contender::{Change, State};
 use cao::measure::reference;
 use cao::transfer::TransferFunction;
@@ -22,6 +23,7 @@ const QUICK_RADIUS: f32 = 8.0;
 
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let folder = Folder::prepare(args)?;
+    let peers = args.peers.as_deref().map(read_peers).transpose()?;
     let mut progress = Progress::new();
     progress.stage("reading");
     let scenes = scenes(args)?;
@@ -42,6 +44,7 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
         ("runs.csv", csv::runs(&chart).into_bytes()),
         ("chart.svg", drawing.svg().into_bytes()),
         ("chart.png", drawing.png()?),
+        ("report.html", report::html(&chart, &machine(), &command(), peers.as_ref())?.into_bytes()),
     ];
     folder.write(&files)?;
     drop(progress);
@@ -54,6 +57,27 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn read_peers(path: &Path) -> Result<Peers> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    Peers::parse(&text).with_context(|| path.display().to_string())
+}
+
+/// The processor, which on a software driver is the device.
+fn machine() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    let name = name.map_or(std::env::consts::ARCH, |(_, name)| name.trim());
+    format!("{name}, {cores} cores, {}", std::env::consts::OS)
+}
+
+/// As it was typed, but for the program's place.
+fn command() -> String {
+    let typed =
+        std::env::args().skip(1).map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
+    std::iter::once("cao".to_owned()).chain(typed).collect::<Vec<_>>().join(" ")
 }
 
 fn plan(args: &Args) -> Plan {
@@ -125,7 +149,8 @@ impl<'a> Folder<'a> {
         }
         let folder = Self { path, made };
         let inputs = || args.scenes.iter().map(Path::new);
-        for (file, extension) in [("runs.csv", "csv"), ("chart.svg", "svg"), ("chart.png", "png")] {
+        for file in ["runs.csv", "chart.svg", "chart.png", "report.html"] {
+            let extension = file.split('.').next_back().unwrap_or_default();
             check_targets(&[&path.join(file)], extension, inputs())?;
         }
         Ok(folder)

@@ -8,6 +8,10 @@
 pub mod csv;
 pub mod draw;
 pub mod front;
+pub mod peers;
+pub mod pictures;
+pub mod report;
+pub mod tables;
 
 use super::contender::{self, Ambient, Asked, BASELINE, Change, Contender, Entry, Setting, State, Subject};
 use super::error::{Errors, errors, shape_errors};
@@ -24,6 +28,7 @@ use crate::view::{StereoRig, View};
 use crate::volume::Volume;
 use crate::{Error, Result};
 use glam::{Vec2, Vec3};
+use pictures::Shown;
 use std::sync::Arc;
 
 /// How much is measured.
@@ -137,6 +142,8 @@ pub struct SceneChart {
     pub points: Vec<Point>,
     /// Median time of drawing both eyes, ms: method, time.
     pub draws: Vec<(&'static str, f64)>,
+    /// What each method shows, and where it errs; of the first scene only.
+    pub pictures: Vec<Shown>,
 }
 
 /// What a reference is worth.
@@ -218,6 +225,8 @@ const VOXEL: usize = 24;
 
 /// Points of the surface at which image-space methods are held to the reference.
 const SURFACE: usize = 1000;
+/// Points of the surface in a picture of errors; and for a first look.
+const PICTURED: [usize; 2] = [6000, 2000];
 
 /// Measures. `progress` hears what is being done and the share of the whole that is done.
 pub fn measure(
@@ -232,9 +241,9 @@ pub fn measure(
     }
     let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(scene, plan)).sum() };
     let mut measured = Vec::new();
-    for scene in scenes {
+    for (n, scene) in scenes.iter().enumerate() {
         let mut say = |what: &str, work: &Work| progress(&format!("{}: {what}", scene.name), work.share());
-        measured.push(one(gpu, scene, plan, &mut work, &mut say)?);
+        measured.push(one(gpu, scene, plan, n == 0, &mut work, &mut say)?);
     }
     let info = gpu.info();
     Ok(Chart {
@@ -285,6 +294,7 @@ fn one(
     gpu: &Gpu,
     scene: &Scene,
     plan: &Plan,
+    pictured: bool,
     work: &mut Work,
     say: &mut dyn FnMut(&str, &Work),
 ) -> Result<SceneChart> {
@@ -296,7 +306,8 @@ fn one(
     let mut truths = Vec::new();
     for change in Change::ALL {
         say("reference", work);
-        truths.push(stand.truth(change, plan, &mut |_| ())?);
+        let pictured = (pictured && change == Change::Volume).then(|| PICTURED[usize::from(plan.quick)]);
+        truths.push(stand.truth(change, plan, pictured.unwrap_or(SURFACE))?);
         work.done += Work::reference(scene, plan);
     }
     let (categories, recomputed) = stand.clip_shares()?;
@@ -308,14 +319,22 @@ fn one(
     let group = (MEMORY / (VOXEL * scene.volume.len()).max(1)).max(2) - 1;
     let mut points = Vec::new();
     let mut draws = Vec::new();
+    let mut shown = Vec::new();
+    let featured: Vec<(&str, Setting)> = match pictured {
+        true => pictures::featured(std::iter::once(&baseline).chain(&entries)),
+        false => Vec::new(),
+    };
     for (n, others) in entries.chunks(group).enumerate() {
         let compete: Vec<&Entry> = std::iter::once(&baseline).chain(others).collect();
-        let found = compete_in(scene, subject, plan, &compete, &truths, work, say)?;
+        let found = compete_in(scene, subject, plan, &compete, &truths, &featured, work, say)?;
         // The baseline's first runs stand for it.
         let own = usize::from(n > 0);
         points.extend(found.0.into_iter().skip(own * Change::ALL.len()));
         draws.extend(found.1);
+        shown.extend(found.2);
     }
+    shown.sort_by_key(|shown| contender::place(shown.method));
+    shown.dedup_by_key(|shown| shown.method);
     draws.dedup_by_key(|(method, _)| *method);
     let names: Vec<&str> = scene.state.clips.iter().map(|clip| clip.shape.name()).collect();
     Ok(SceneChart {
@@ -329,6 +348,7 @@ fn one(
         recomputed,
         points,
         draws,
+        pictures: shown,
     })
 }
 
@@ -336,15 +356,18 @@ fn no_baseline() -> Error {
     Error::Config { what: "chart".into(), problem: format!("no contender is {BASELINE} with 26 rays") }
 }
 
-/// The points of each contender for all changes, contender by contender; and the draw times of each method's first.
-type Found = (Vec<Point>, Vec<(&'static str, f64)>);
+/// The points of each contender for all changes, contender by contender; the draw times of each method's first; pictures of those that are
+/// featured.
+type Found = (Vec<Point>, Vec<(&'static str, f64)>, Vec<Shown>);
 
+#[expect(clippy::too_many_arguments, reason = "what competes, on what, and who listens, each named once")]
 fn compete_in(
     scene: &Scene,
     subject: Subject,
     plan: &Plan,
     entries: &[&Entry],
     truths: &[Known],
+    featured: &[(&str, Setting)],
     work: &mut Work,
     say: &mut dyn FnMut(&str, &Work),
 ) -> Result<Found> {
@@ -400,7 +423,15 @@ fn compete_in(
         }
         draws.push((entry.method, front::quartiles(times.into_iter())[1]));
     }
-    Ok((points.into_iter().flatten().collect(), draws))
+    let mut shown = Vec::new();
+    for (entry, contender) in entries.iter().zip(&open) {
+        if featured.iter().any(|(method, setting)| *method == entry.method && *setting == entry.setting) {
+            let (image, _) = contender.draw(&look)?;
+            let found = contender.ambient()?;
+            shown.push(truths[0].shown(&scene.grid(), entry, &image, &found));
+        }
+    }
+    Ok((points.into_iter().flatten().collect(), draws, shown))
 }
 
 /// The scene without any contender: what there is to see, and the truth about it.
@@ -413,6 +444,8 @@ struct Stand<'a> {
 /// What is known of one state.
 struct Known {
     reference: Reference,
+    /// Of every so many pixels along both edges of the image the surface is known.
+    stride: usize,
     /// Points of the surface in the left eye's image: index coordinates, pixel, ambient value.
     surface: Vec<([f64; 3], usize, f32)>,
 }
@@ -431,7 +464,7 @@ impl<'a> Stand<'a> {
     }
 
     /// The reference of the state after a change.
-    fn truth(&mut self, change: Change, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Known> {
+    fn truth(&mut self, change: Change, plan: &Plan, most: usize) -> Result<Known> {
         let state = self.scene.after(change);
         self.renderer.set_transfer(state.transfer.clone())?;
         self.renderer.set_clips(&state.clips)?;
@@ -443,19 +476,18 @@ impl<'a> Stand<'a> {
         let (radius, offset) = (f64::from(state.radius_mm), 0.5 * smallest);
         let length = f64::from(state.transfer.reference_mm(smallest));
         let plan = &plan.reference;
-        let reference =
-            reference::ambient(gpu, &grid, &opacity, radius, offset, length, plan, &mut *progress)?;
+        let quiet = &mut |_| ();
+        let reference = reference::ambient(gpu, &grid, &opacity, radius, offset, length, plan, quiet)?;
 
         let (image, _) =
             self.renderer.draw(self.subject.views, &contender::surface_look(), self.subject.size)?;
         let shown = surface_points(&grid, &self.subject.views[0], self.subject.size, &image.depth[0]);
-        let stride = shown.len().div_ceil(SURFACE).max(1);
-        let shown: Vec<_> = shown.into_iter().step_by(stride).collect();
+        let (stride, shown) = thinned(shown, self.subject.size[0] as usize, most);
         let points: Vec<[f64; 3]> = shown.iter().map(|(point, _)| *point).collect();
         let values =
-            reference::ambient_at(gpu, &grid, &opacity, &points, radius, offset, length, plan, progress)?;
+            reference::ambient_at(gpu, &grid, &opacity, &points, radius, offset, length, plan, quiet)?;
         let surface = shown.into_iter().zip(values).map(|((point, pixel), value)| (point, pixel, value));
-        Ok(Known { reference, surface: surface.collect() })
+        Ok(Known { reference, stride, surface: surface.collect() })
     }
 
     /// Categories after the clips moved, and the share of the voxels with a value that was recomputed for it.
@@ -487,6 +519,20 @@ fn surface_points(
         (grid.to_index(world.to_array().map(f64::from)), i)
     });
     shown.collect()
+}
+
+/// Those of every n-th row and column, the least n at which at most `most` remain; and n.
+fn thinned(shown: Vec<([f64; 3], usize)>, width: usize, most: usize) -> (usize, Vec<([f64; 3], usize)>) {
+    let kept = |n: usize| {
+        move |(_, pixel): &&([f64; 3], usize)| {
+            (pixel % width).is_multiple_of(n) && (pixel / width).is_multiple_of(n)
+        }
+    };
+    let mut n = 1;
+    while shown.iter().filter(kept(n)).count() > most {
+        n += 1;
+    }
+    (n, shown.iter().filter(kept(n)).copied().collect())
 }
 
 impl Known {
@@ -537,6 +583,12 @@ impl Known {
 }
 
 impl Chart {
+    /// Whether a point's contender is the one that stands for its method in tables and pictures.
+    fn featured(&self, point: &Point) -> bool {
+        let mut shown = self.scenes.iter().flat_map(|scene| &scene.pictures);
+        shown.any(|shown| shown.method == point.method && shown.setting == point.setting)
+    }
+
     /// What one has to know to read the chart, line by line.
     pub fn caption(&self) -> Vec<String> {
         let mut lines = vec![format!("{}, {}.", self.device, self.driver)];
