@@ -4,6 +4,7 @@ pub mod chart;
 pub mod contender;
 pub mod error;
 pub mod exactness;
+pub mod flip;
 pub mod plot;
 pub mod random;
 pub mod reference;
