@@ -221,7 +221,7 @@ pub struct Chart {
     /// Opacity and colour of values, as in `cao render` [default: the scene's, auto for volumes]
     #[arg(long, value_name = "FILE|PRESET")]
     pub transfer: Option<String>,
-    /// Length of the rays in mm [default: the scene's; 10 voxels for the default scenes, else 20]
+    /// Length of the rays in mm [default: the scene's; 8 voxels for the default scenes, else 20]
     #[arg(long, value_name = "R", value_parser = positive, allow_hyphen_values = true)]
     pub radius_mm: Option<f32>,
     #[command(flatten)]

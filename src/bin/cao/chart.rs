@@ -14,12 +14,12 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// Scenes where none is given, of a size at which a software driver takes minutes; and their radius in voxels, a sixth of the
-/// edge, so that the clip touches as much of them as the paper's clips do.
-const DEFAULT: [&str; 3] = ["builtin:engine:64", "builtin:fruit:64", "builtin:skeleton:64"];
-const DEFAULT_RADIUS: f32 = 10.0;
+/// edge, so that the clip touches not much more of them than the paper's clips do.
+const DEFAULT: [&str; 3] = ["builtin:engine:48", "builtin:fruit:48", "builtin:skeleton:48"];
+const DEFAULT_RADIUS: f32 = 8.0;
 /// The same for a first look.
-const QUICK: [&str; 3] = ["builtin:engine:40", "builtin:fruit:40", "builtin:skeleton:40"];
-const QUICK_RADIUS: f32 = 8.0;
+const QUICK: [&str; 3] = ["builtin:engine:32", "builtin:fruit:32", "builtin:skeleton:32"];
+const QUICK_RADIUS: f32 = 6.0;
 
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let folder = Folder::prepare(args)?;

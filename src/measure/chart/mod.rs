@@ -307,7 +307,15 @@ fn one(
     for change in Change::ALL {
         say("reference", work);
         let pictured = (pictured && change == Change::Volume).then(|| PICTURED[usize::from(plan.quick)]);
-        truths.push(stand.truth(change, plan, pictured.unwrap_or(SURFACE))?);
+        let truth = stand.truth(change, plan, pictured.unwrap_or(SURFACE))?;
+        if truth.reference.counting == 0 {
+            let problem = format!(
+                "nothing to measure after {}: no voxel has opacity; choose another transfer function or clip",
+                change.name()
+            );
+            return Err(Error::Config { what: scene.name.clone(), problem });
+        }
+        truths.push(truth);
         work.done += Work::reference(scene, plan);
     }
     let (categories, recomputed) = stand.clip_shares()?;

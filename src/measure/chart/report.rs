@@ -14,7 +14,7 @@ body { font: 15px/1.5 'DejaVu Sans', Verdana, sans-serif; color: #222; backgroun
 h1 { font-size: 24px } h2 { font-size: 19px; margin-top: 40px; border-bottom: 1px solid #ccc } h3 { font-size: 16px }
 p.small, li.small, figcaption { font-size: 13px; color: #555 }
 table { border-collapse: collapse; font-size: 13px; margin: 12px 0 }
-th, td { padding: 3px 10px; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top }
+th, td { padding: 3px 10px; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; white-space: nowrap }
 th { border-bottom: 2px solid #888 } .n { text-align: right; white-space: nowrap }
 .wide { overflow-x: auto } svg { max-width: 100%; height: auto }
 .methods { display: flex; flex-wrap: wrap; gap: 18px } figure { margin: 0; width: 340px }

@@ -110,6 +110,7 @@ pub(super) fn table_2(chart: &Chart) -> String {
         .map(|row| {
             let mut row: Vec<String> = row.iter().map(|cell| (*cell).into()).collect();
             row[0] = format!("paper: {}", row[0]);
+            row.swap(2, 3);
             row.extend([String::new(), String::new()]);
             row
         })
@@ -123,34 +124,29 @@ pub(super) fn table_2(chart: &Chart) -> String {
         rows.push(vec![
             escaped(&scene.name),
             format!("{x} × {y} × {z}"),
-            samples.to_string(),
             escaped(&scene.clips),
+            samples.to_string(),
             format!("{:.2}", 100.0 * f64::from(c.affected) / all),
             format!("{:.2}", 100.0 * f64::from(c.clipped) / all),
             format!("{:.1}", 100.0 * scene.recomputed),
         ]);
     }
-    let head = [
-        "scene",
-        "resolution",
-        "samples a ray",
-        "clip",
-        "affected, % of all voxels",
-        "clipped, % of all",
-        "recomputed, % of the voxels that show",
-    ];
-    table(&head, 2, &rows)
+    let head = ["scene", "resolution", "clip", "samples a ray", "affected, %", "clipped, %", "recomputed, %"];
+    let note = "<p>Affected (category b, the paper's \"% voxels recalculated\") and clipped: of all voxels. Recomputed: of the voxels that show, which are all that CAO here computes.</p>\n";
+    note.to_owned() + &table(&head, 3, &rows)
 }
 
 /// CAO Table 3: frame rates while the clip moves.
 pub(super) fn table_3(chart: &Chart) -> String {
     let mut rows = Vec::new();
-    let row = |scene: &str, rays: &str, solid: f64, lao: f64, cao: f64| {
-        vec![scene.into(), rays.into(), short(solid), short(lao), short(cao), format!("{:.2}", cao / lao)]
+    let row = |scene: String, rays: &str, rates: [String; 3], speed_up: f64| {
+        let [solid, lao, cao] = rates;
+        vec![scene, rays.into(), solid, lao, cao, format!("{speed_up:.2}")]
     };
     for (scene, solid, rates) in TABLE_3 {
         for (rays, [lao, cao]) in RAYS.into_iter().zip(rates) {
-            rows.push(row(&format!("paper: {scene}"), rays, solid, lao, cao));
+            let printed = [solid, lao, cao].map(|rate| format!("{rate:.3}"));
+            rows.push(row(format!("paper: {scene}"), rays, printed, cao / lao));
         }
     }
     for scene in &chart.scenes {
@@ -158,8 +154,9 @@ pub(super) fn table_3(chart: &Chart) -> String {
             let (Some(lao), Some(cao)) = (frame(scene, BASELINE, rays), frame(scene, "CAO", rays)) else {
                 continue;
             };
-            let solid = drawing(scene, "solid colour");
-            rows.push(row(&escaped(&scene.name), rays, 1e3 / solid, 1e3 / lao.total(), 1e3 / cao.total()));
+            let times = [drawing(scene, "solid colour"), lao.total(), cao.total()];
+            let rates = times.map(|ms| short(1e3 / ms));
+            rows.push(row(escaped(&scene.name), rays, rates, lao.total() / cao.total()));
         }
     }
     let [width, height] = chart.plan.size;
