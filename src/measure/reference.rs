@@ -132,6 +132,26 @@ pub fn ambient_in(
     Ok(found)
 }
 
+/// The ambient reference at points of the volume, in index coordinates, rather than at its voxels; no voxels are left out and none is
+/// computed twice. As [`ambient`] otherwise.
+#[expect(clippy::too_many_arguments, reason = "volume, lengths and settings, each named once")]
+pub fn ambient_at(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    points: &[[f64; 3]],
+    radius_mm: f64,
+    offset_mm: f64,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<f32>> {
+    let integral = integral(radius_mm, offset_mm, grid, plan)?;
+    let kernel = Kernel::new(gpu)?;
+    let scene = Scene::new(gpu, &kernel, grid, opacity)?;
+    Ok(scene.evaluate(points, &integral, reference_mm, progress)?.0)
+}
+
 /// The ambient integral of these lengths.
 fn integral(radius_mm: f64, offset_mm: f64, grid: &Grid, plan: &Plan) -> Result<Integral> {
     check("radius_mm", radius_mm, 0.0)?;
