@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use cao::clip::{Clip, Mode, Pose, Shape};
+use cao::measure::stability::Sweep;
 use cao::mesh::TriangleMesh;
 use cao::occlusion::{Quadrature, RaySet};
 use cao::scene::{Method, VolumeSource};
@@ -74,6 +75,9 @@ pub enum Command {
     /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(Verify),
+    /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
     /// Show a volume's header, value range and histogram
     Info(Info),
     /// List the Vulkan devices
@@ -104,6 +108,15 @@ Examples:
   cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
 
 Exit code 1 if any voxel or any point that both eyes see differs.";
+
+const STABILITY_EXAMPLES: &str = "\
+Examples:
+  cao stability -o stability            all sweeps; open stability/index.html
+  cao stability -o out --quick --only stereo,views
+  cao stability --list
+
+Exit code 1 if ours fails where it claims to hold, or the method that a sweep
+is there to catch does not.";
 
 /// How to read a file that holds nothing but values.
 #[derive(Args)]
@@ -255,6 +268,22 @@ pub struct Verify {
     pub settings: Settings,
     #[command(flatten)]
     pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Stability {
+    /// Folder for index.html, and for each sweep its data (CSV) and charts (SVG, PNG); made where missing
+    #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Only these sweeps, as --list names them
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Sweep::parse(s))]
+    pub only: Vec<Sweep>,
+    /// Fewer and coarser steps: under a minute instead of some minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Name the sweeps, and do nothing else
+    #[arg(long)]
+    pub list: bool,
 }
 
 #[derive(Args)]

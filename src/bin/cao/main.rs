@@ -6,6 +6,7 @@ mod info;
 mod occlusion;
 mod output;
 mod render;
+mod stability;
 mod verify;
 
 use clap::{CommandFactory, FromArgMatches};
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&cli.global, a, of_command),
         args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
         args::Command::Verify(a) => verify::run(&cli.global, a),
+        args::Command::Stability(a) => stability::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };

@@ -1,0 +1,89 @@
+//! `cao stability`: the sweeps of where methods fail, as data, charts and one sentence each.
+
+use crate::args::{Global, Stability, usage};
+use crate::output::{Out, Progress, check_validation, open_gpu};
+use anyhow::{Context, Result};
+use cao::measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep};
+use cao::volume::write_atomic;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::ExitCode;
+
+pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
+    let mut out = Out::new(global);
+    if args.list {
+        for sweep in SWEEPS {
+            out.line(format!("{:<12} {}", sweep.name, sweep.title));
+        }
+        out.json(json!({ "sweeps": SWEEPS.map(|s| json!({ "name": s.name, "title": s.title })) }));
+        out.finish()?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let folder = args.output.as_deref().ok_or_else(|| usage("-o DIR is missing: where to write"))?;
+    let sweeps = match args.only.is_empty() {
+        true => SWEEPS.to_vec(),
+        false => args.only.clone(),
+    };
+    let effort = if args.quick { Effort::Quick } else { Effort::Full };
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+
+    let mut progress = Progress::new();
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    out.device(&gpu);
+    let mut findings = Vec::new();
+    for sweep in sweeps {
+        progress.stage(sweep.name);
+        let finding = (sweep.run)(&gpu, effort, &mut |done| progress.set(done))?;
+        write(folder, sweep, &finding)?;
+        findings.push((sweep, finding));
+    }
+    drop(progress);
+    check_validation(&gpu)?;
+    for (sweep, finding) in &findings {
+        out.line(format!("{:<10} {:<8} {}", sweep.name, finding.ours.name(), finding.sentence));
+        if !finding.control_fails {
+            out.line("           the method that has to fail here did not: this sweep shows nothing");
+        }
+    }
+    let good = |f: &Finding| f.ours != Ours::Fails && f.control_fails;
+    let all_good = findings.iter().all(|(_, finding)| good(finding));
+    out.json(json!({
+        "good": all_good,
+        "sweeps": findings.iter().map(|(sweep, f)| json!({
+            "name": sweep.name,
+            "title": sweep.title,
+            "ours": f.ours.name(),
+            "control_fails": f.control_fails,
+            "sentence": f.sentence,
+            "setting": f.setting,
+        })).collect::<Vec<_>>(),
+    }));
+    out.wrote(folder);
+    out.finish()?;
+    Ok(if all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn write(folder: &Path, sweep: Sweep, finding: &Finding) -> Result<()> {
+    let csv = csv(finding);
+    write_atomic(&folder.join(format!("{}.csv", sweep.name)), |file| file.write_all(csv.as_bytes()))?;
+    Ok(())
+}
+
+/// One row for each point.
+fn csv(finding: &Finding) -> String {
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut rows = String::from("chart,series,x,y,x_axis,y_axis\n");
+    for panel in &finding.panels {
+        for series in &panel.series {
+            for [x, y] in &series.points {
+                let names = [&panel.title, &series.name].map(|name| quoted(name)).join(",");
+                let axes = [&panel.x.label, &panel.y.label].map(|name| quoted(name)).join(",");
+                // Writing to a String cannot fail.
+                let _ = writeln!(rows, "{names},{x},{y},{axes}");
+            }
+        }
+    }
+    rows
+}
