@@ -209,6 +209,84 @@ impl Occlusion {
     }
 }
 
+/// What a reference integrates (measure.md §1): many directions, and along each of them samples at
+/// `first_mm + m·step_mm`, m = 0 … `samples` − 1, all lengths in mm from the point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integral {
+    /// What the samples of a ray become.
+    pub rule: Rule,
+    /// Number of directions, spread by [`fibonacci`], equal weights.
+    pub directions: u32,
+    /// Distance of the first sample.
+    pub first_mm: f64,
+    /// Distance between samples.
+    pub step_mm: f64,
+    /// Samples of a ray; 0 leaves every point unoccluded.
+    pub samples: u32,
+}
+
+/// What the samples of a reference's ray become.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// The mean transmittance along the ray, extinction constant between the middles of samples.
+    Ambient = 0,
+    /// CAO eq. (2): the mean over the samples of the transmittance in front of each.
+    Literal = 1,
+}
+
+impl Integral {
+    /// The mean transmittance from `offset_mm` to `radius_mm`, with at least `steps_per_voxel` samples on the smallest
+    /// spacing.
+    pub fn ambient(
+        radius_mm: f64,
+        offset_mm: f64,
+        steps_per_voxel: u32,
+        directions: u32,
+        min_spacing: f64,
+    ) -> Self {
+        let length = (radius_mm - offset_mm).max(0.0);
+        // Rounding of lengths in mm must not add a sample.
+        let samples = (length / min_spacing * f64::from(steps_per_voxel) - 1e-6).ceil().max(0.0);
+        let step_mm = if samples > 0.0 { length / samples } else { min_spacing };
+        let first_mm = offset_mm + 0.5 * step_mm;
+        Self { rule: Rule::Ambient, directions, first_mm, step_mm, samples: samples as u32 }
+    }
+
+    /// What CAO eq. (2) and (3) converge to with ever more rays: its sum at steps of the smallest spacing.
+    pub fn literal(radius_mm: f64, directions: u32, min_spacing: f64) -> Self {
+        let samples = (radius_mm / min_spacing).round() as u32;
+        Self { rule: Rule::Literal, directions, first_mm: min_spacing, step_mm: min_spacing, samples }
+    }
+
+    /// The same at twice the resolution: twice the directions, and for [`Rule::Ambient`] half the step.
+    #[must_use]
+    pub fn doubled(&self) -> Self {
+        let directions = 2 * self.directions;
+        match self.rule {
+            Rule::Literal => Self { directions, ..*self },
+            Rule::Ambient => {
+                let step_mm = 0.5 * self.step_mm;
+                let first_mm = self.first_mm - 0.5 * step_mm;
+                Self { directions, first_mm, step_mm, samples: 2 * self.samples, ..*self }
+            }
+        }
+    }
+}
+
+/// `count` unit vectors spread evenly over the sphere: heights in equal steps, each turned by the golden angle from the
+/// last (González, Measurement of areas on a sphere using Fibonacci and latitude–longitude lattices, 2010).
+pub fn fibonacci(count: u32) -> Vec<[f64; 3]> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    (0..count)
+        .map(|k| {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(count);
+            let (sin, cos) = (f64::from(k) * golden).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            [r * cos, r * sin, z]
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -275,5 +353,39 @@ mod tests {
         ] {
             assert!(bad.check(1.0).unwrap_err().to_string().starts_with(name));
         }
+    }
+
+    #[test]
+    fn integrals_cover_their_ray_and_doubling_keeps_it() {
+        let covered = |i: &Integral| {
+            (i.first_mm - 0.5 * i.step_mm, i.first_mm + (f64::from(i.samples) - 0.5) * i.step_mm)
+        };
+        let close = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).abs() < 1e-12 && (a.1 - b.1).abs() < 1e-12;
+        let ambient = Integral::ambient(6.0, 0.25, 8, 100, 0.5);
+        assert_eq!(ambient.samples, 92);
+        assert!(close(covered(&ambient), (0.25, 6.0)) && close(covered(&ambient.doubled()), (0.25, 6.0)));
+        assert_eq!(ambient.doubled(), Integral::ambient(6.0, 0.25, 16, 200, 0.5));
+        let literal = Integral::literal(6.0, 100, 0.5);
+        assert_eq!((literal.samples, literal.first_mm), (12, 0.5));
+        assert_eq!(literal.doubled(), Integral { directions: 200, ..literal });
+        assert_eq!(Integral::ambient(1.0, 2.0, 8, 100, 1.0).samples, 0);
+    }
+
+    /// The mean of x², of xy and of x⁴ over the sphere are 1/3, 0 and 1/5.
+    #[test]
+    fn fibonacci_directions_are_unit_and_even() {
+        let all = fibonacci(1000);
+        let mean = |f: fn(&[f64; 3]) -> f64| all.iter().map(f).sum::<f64>() / 1000.0;
+        assert!(all.iter().all(|d| (d.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-12));
+        for (found, exact) in [
+            (mean(|d| d[0] * d[0]), 1.0 / 3.0),
+            (mean(|d| d[2] * d[2]), 1.0 / 3.0),
+            (mean(|d| d[0] * d[1]), 0.0),
+            (mean(|d| d[1]), 0.0),
+            (mean(|d| d[1].powi(4)), 0.2),
+        ] {
+            assert!((found - exact).abs() < 2e-4, "{found} {exact}");
+        }
+        assert_eq!(fibonacci(0), [[0.0; 3]; 0]);
     }
 }

@@ -138,7 +138,7 @@ fn mean_extinction(q0: f64, q1: f64) -> f64 {
 }
 
 /// (1 − e^−x)/x, the mean transmittance over an optical depth x.
-fn mean_transmittance(x: f64) -> f64 {
+pub(super) fn mean_transmittance(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x }
 }
 

@@ -13,6 +13,7 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod reference;
 pub mod ssao;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.

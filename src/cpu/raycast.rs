@@ -58,12 +58,55 @@ pub struct Image {
 
 /// Draws `size` = [width, height] pixels.
 pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
+    let ambient = |position| trilinear_clamped(&frame.grid, frame.ambient, position);
     let (colour, depth) =
-        each(size[0] * size[1], |i| pixel(frame, view, size, [i % size[0], i / size[0]])).into_iter().unzip();
+        each(size[0] * size[1], |i| pixel(frame, view, size, i, &mut { ambient })).into_iter().unzip();
     Image { colour, depth }
 }
 
-fn pixel(frame: &Frame, view: &View, size: [usize; 2], [x, y]: [usize; 2]) -> ([f32; 4], f32) {
+/// Index coordinates at which these pixels read the ambient factor, in the order of their rays.
+pub fn ambient_positions(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    pixels: &[usize],
+) -> Vec<Vec<[f64; 3]>> {
+    each(pixels.len(), |i| {
+        let mut positions = Vec::new();
+        pixel(frame, view, size, pixels[i], &mut |position| {
+            positions.push(position);
+            1.0
+        });
+        positions
+    })
+}
+
+/// Draws these pixels with ambient factors of their own instead of the frame's, one for each of [`ambient_positions`].
+pub fn raycast_lit(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    pixels: &[usize],
+    ambient: &[Vec<f64>],
+) -> Image {
+    let (colour, depth) = each(pixels.len(), |i| {
+        let mut ambient = ambient[i].iter();
+        pixel(frame, view, size, pixels[i], &mut |_| *ambient.next().expect("one value a position"))
+    })
+    .into_iter()
+    .unzip();
+    Image { colour, depth }
+}
+
+/// Pixel `index`, its ambient factors from `ambient` of index coordinates.
+fn pixel(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    index: usize,
+    ambient: &mut dyn FnMut([f64; 3]) -> f64,
+) -> ([f32; 4], f32) {
+    let [x, y] = [index % size[0], index / size[0]];
     let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
     let (origin, direction) = view.ray(centre / Vec2::new(size[0] as f32, size[1] as f32));
     let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3());
@@ -95,11 +138,7 @@ fn pixel(frame: &Frame, view: &View, size: [usize; 2], [x, y]: [usize; 2]) -> ([
         let value = value_at(t);
         let opacity = f64::from(frame.transfer.opacity_at(value));
         let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
-        let shade = if frame.shading.occlusion {
-            GAIN * trilinear_clamped(&frame.grid, frame.ambient, position)
-        } else {
-            1.0
-        };
+        let shade = if frame.shading.occlusion { GAIN * ambient(position) } else { 1.0 };
         let light =
             f64::from(frame.shading.ambient) + f64::from(frame.shading.diffuse) * surface(frame, position);
         let emitted = Vec3::from_array(frame.transfer.colour_at(value)).as_dvec3();

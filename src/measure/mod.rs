@@ -1,5 +1,8 @@
-//! Numbers in, numbers out: whether the claims hold, and where methods stop holding.
+//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and where methods stop holding.
 
+pub mod error;
 pub mod exactness;
 pub mod random;
+pub mod reference;
+pub mod ssim;
 pub mod stability;

@@ -2,5 +2,5 @@
 
 pub mod cao;
 pub mod lao;
-mod parts;
+pub mod parts;
 pub mod volumes;

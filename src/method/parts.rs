@@ -3,7 +3,7 @@
 
 use super::volumes::{Kernels, Settings};
 use crate::Result;
-use crate::gpu::{Access, BufferUse, Gpu};
+use crate::gpu::{Access, BufferUse, Gpu, Recorder};
 use crate::stage::bricks::BrickList;
 use crate::stage::field::{BRICK, Field};
 use crate::stage::lao::{Bindings, Work};
@@ -29,28 +29,34 @@ pub fn run(
     rec.submit_and_wait()?;
     let count: u32 = bytemuck::pod_read_unaligned(&read_back.read(0, 4)?);
 
-    // The first part is small enough for any device; the rest follow its pace.
+    // The first part is small enough for any device.
     let brick_samples = f64::from(BRICK.pow(3))
         * settings.occlusion.rays.directions().len() as f64
         * f64::from(settings.occlusion.samples(f64::from(field.min_spacing())).max(1));
-    let mut part = (4e6 / brick_samples).clamp(1.0, 1e6) as u32;
-    let (mut done, mut total_ms) = (0, 0.0);
+    let first = (4e6 / brick_samples).clamp(1.0, 1e6) as u32;
+    let (occlusion, reference_mm, scope) = (&settings.occlusion, settings.reference_mm, settings.scope);
+    let mut record = |rec: &mut Recorder, base: u32, now: u32| {
+        kernels.lao.record_part(rec, field, occlusion, reference_mm, scope, work, bindings, base, now)
+    };
+    Ok((stage.into(), in_parts(gpu, stage, count, first, &mut record, progress)?))
+}
+
+/// Has `record` record items `base` … `base + now` of `count`, `first` of them at first, then as many as take a tenth of a
+/// second; tells `progress` the share done (0 … 1). Waits for the end; returns the device's time in ms.
+pub fn in_parts(
+    gpu: &Gpu,
+    stage: &str,
+    count: u32,
+    first: u32,
+    record: &mut dyn FnMut(&mut Recorder, u32, u32) -> Result<()>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<f64> {
+    let (mut part, mut done, mut total_ms) = (first.max(1), 0, 0.0);
     while done < count {
         let now = part.min(count - done);
         let mut rec = gpu.recorder(stage)?;
         rec.stage(stage)?;
-        let (occlusion, reference_mm) = (&settings.occlusion, settings.reference_mm);
-        kernels.lao.record_part(
-            &mut rec,
-            field,
-            occlusion,
-            reference_mm,
-            settings.scope,
-            work,
-            bindings,
-            done,
-            now,
-        )?;
+        record(&mut rec, done, now)?;
         rec.end_stage()?;
         let start = Instant::now();
         total_ms += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
@@ -59,5 +65,5 @@ pub fn run(
         let pace = 0.1 / start.elapsed().as_secs_f64().max(1e-4);
         part = (f64::from(now) * pace.clamp(0.25, 4.0)).clamp(1.0, 1e7) as u32;
     }
-    Ok((stage.into(), total_ms))
+    Ok(total_ms)
 }

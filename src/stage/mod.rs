@@ -14,6 +14,7 @@ pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
+pub mod reference;
 pub mod transfer;
 
 use crate::Result;

@@ -1,0 +1,272 @@
+//! The truth that methods are measured against (measure.md §1), with its own error: everything is computed once more at
+//! twice the resolution, on a sample, and the change is stated.
+//!
+//! * [`ambient`]: the integral that ambient occlusion stands for, at the voxels that count;
+//! * [`literal`]: what the paper's sum converges to with ever more rays;
+//! * [`image`]: the picture with ambient occlusion evaluated at every sample of its rays instead of read from a volume.
+
+use super::error::{Errors, counting, errors};
+use super::random::Random;
+use crate::cpu::Grid;
+use crate::cpu::raycast::{Frame, Image, ambient_positions, raycast_lit};
+use crate::gpu::{self, Gpu};
+use crate::method::parts::in_parts;
+use crate::occlusion::Integral;
+use crate::stage::field::Field;
+use crate::stage::reference::{Points, Reference as Kernel, upload_clearance};
+use crate::view::View;
+use crate::volume::{Values, Volume};
+use crate::{Error, Result};
+
+/// How well a reference is to converge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Directions from each point.
+    pub directions: u32,
+    /// Samples along the smallest spacing.
+    pub steps_per_voxel: u32,
+    /// Most voxels to compute; where more count, a stratified sample of them.
+    pub max_voxels: usize,
+}
+
+impl Plan {
+    /// measure.md §1: at least 1000 directions, steps of an eighth of a voxel, every voxel that counts.
+    pub const FULL: Self = Self { directions: 1000, steps_per_voxel: 8, max_voxels: usize::MAX };
+    /// For a first look: some thousand voxels at a quarter of the directions and twice the step.
+    pub const QUICK: Self = Self { directions: 256, steps_per_voxel: 4, max_voxels: 4000 };
+}
+
+/// Voxels, or pixels, that are computed once more at twice the resolution.
+const CHECKED: usize = 1000;
+
+/// Converged ambient values of a volume.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Ambient value of each voxel, x fastest; NaN where not computed.
+    pub ambient: Vec<f32>,
+    /// Voxels that were computed: those that count ([`counting`]), or a sample of them.
+    pub counts: Vec<bool>,
+    /// Voxels that count, computed or not.
+    pub counting: usize,
+    /// What was computed.
+    pub integral: Integral,
+    /// Change at a sample of the computed voxels when directions are doubled, and steps too unless they are the method's.
+    pub convergence: Errors,
+    /// Time of the device in ms.
+    pub device_ms: f64,
+}
+
+/// The ambient reference of an opacity volume after clipping (as `Renderer::read_opacity` has it), opacity per
+/// `reference_mm`. `progress` hears the share done. Uses the device's queue and waits for it.
+#[expect(clippy::too_many_arguments, reason = "volume, lengths and settings, each named once")]
+pub fn ambient(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    radius_mm: f64,
+    offset_mm: f64,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Reference> {
+    let integral =
+        Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, grid.min_spacing());
+    volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
+}
+
+/// The literal reference: CAO eq. (2) and (3) at steps of the smallest spacing, with the plan's directions. As [`ambient`]
+/// otherwise.
+pub fn literal(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    radius_mm: f64,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Reference> {
+    let integral = Integral::literal(radius_mm, plan.directions, grid.min_spacing());
+    volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
+}
+
+fn volume(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    integral: Integral,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Reference> {
+    let scene = Scene::new(gpu, grid, opacity)?;
+    let counts = counting(grid, opacity);
+    let all: Vec<usize> = (0..grid.len()).filter(|i| counts[*i]).collect();
+    let computed = sample(&all, plan.max_voxels);
+    let checked = sample(&computed, CHECKED);
+    let centres = |voxels: &[usize]| -> Vec<[f64; 3]> {
+        voxels.iter().map(|i| grid.voxel(*i).map(|c| c as f64)).collect()
+    };
+    let doubled = integral.doubled();
+    let share = share(&integral, computed.len(), &doubled, checked.len());
+    let (values, ms) =
+        scene.evaluate(&centres(&computed), &integral, reference_mm, &mut |part| progress(share * part))?;
+    let (finer, finer_ms) = scene.evaluate(&centres(&checked), &doubled, reference_mm, &mut |part| {
+        progress(share + (1.0 - share) * part);
+    })?;
+
+    let mut ambient = vec![f32::NAN; grid.len()];
+    let mut counts = vec![false; grid.len()];
+    for (&voxel, value) in computed.iter().zip(values) {
+        ambient[voxel] = value;
+        counts[voxel] = true;
+    }
+    let coarser: Vec<f32> = checked.iter().map(|i| ambient[*i]).collect();
+    let convergence = errors(&coarser, &finer, &vec![true; finer.len()]);
+    Ok(Reference { ambient, counts, counting: all.len(), integral, convergence, device_ms: ms + finer_ms })
+}
+
+/// Part of the work that the first of two evaluations is.
+fn share(first: &Integral, first_points: usize, second: &Integral, second_points: usize) -> f64 {
+    let work = |i: &Integral, points: usize| {
+        f64::from(i.directions) * f64::from(i.samples.max(1)) * points.max(1) as f64
+    };
+    1.0 / (1.0 + work(second, second_points) / work(first, first_points))
+}
+
+/// All of them, or `most`: one at random from each of as many equal runs. The same each time.
+fn sample(all: &[usize], most: usize) -> Vec<usize> {
+    if all.len() <= most {
+        return all.to_vec();
+    }
+    let mut random = Random::new(1);
+    let run = |i: usize| i * all.len() / most;
+    (0..most).map(|i| all[run(i) + random.below((run(i + 1) - run(i)) as u64) as usize]).collect()
+}
+
+/// A picture whose every sample has its own ambient factor.
+#[derive(Clone, Debug)]
+pub struct ImageReference {
+    /// The picture.
+    pub image: Image,
+    /// Pixels that show anything.
+    pub covered: usize,
+    /// Points at which the ambient factor was evaluated.
+    pub points: usize,
+    /// Change of the colours (premultiplied linear red, green, blue) of a sample of those pixels when directions are doubled and the steps of
+    /// both kinds of rays halved.
+    pub convergence: Errors,
+    /// Time of the device in ms.
+    pub device_ms: f64,
+}
+
+/// The image reference: the ray cast of [`crate::cpu::raycast`] with the plan's steps on the smallest spacing, the ambient
+/// factor of each of its samples evaluated by the ambient integral around that very point. For small images: every sample of
+/// every ray costs what a voxel costs. The frame's own `ambient` and `step_mm` are not used. Uses the device's queue and waits for it.
+#[expect(clippy::too_many_arguments, reason = "scene, lengths and settings, each named once")]
+pub fn image(
+    gpu: &Gpu,
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    radius_mm: f64,
+    offset_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<ImageReference> {
+    let scene = Scene::new(gpu, &frame.grid, frame.opacity)?;
+    let smallest = frame.grid.min_spacing();
+    let integral = Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, smallest);
+    let fine = Frame { step_mm: smallest / f64::from(plan.steps_per_voxel), ..*frame };
+    let finer = Frame { step_mm: 0.5 * fine.step_mm, ..fine };
+    let pixels: Vec<usize> = (0..size[0] * size[1]).collect();
+    let positions = ambient_positions(&fine, view, size, &pixels);
+    let covered: Vec<usize> = pixels.iter().copied().filter(|i| !positions[*i].is_empty()).collect();
+    let checked = sample(&covered, CHECKED_PIXELS);
+    let finer_positions = ambient_positions(&finer, view, size, &checked);
+    let count = |positions: &[Vec<[f64; 3]>]| positions.iter().map(Vec::len).sum::<usize>();
+    let (points, finer_points) = (count(&positions), count(&finer_positions));
+
+    let doubled = integral.doubled();
+    let share = share(&integral, points, &doubled, finer_points);
+    let mut lit =
+        |frame: &Frame, pixels: &[usize], positions: &[Vec<[f64; 3]>], integral, from: f64, part: f64| {
+            let (values, ms) =
+                scene.evaluate(&positions.concat(), integral, frame.reference_mm, &mut |done| {
+                    progress(from + part * done);
+                })?;
+            let mut values = values.into_iter().map(f64::from);
+            let by_pixel: Vec<Vec<f64>> =
+                positions.iter().map(|p| values.by_ref().take(p.len()).collect()).collect();
+            Ok::<_, Error>((raycast_lit(frame, view, size, pixels, &by_pixel), ms))
+        };
+    let (image, ms) = lit(&fine, &pixels, &positions, &integral, 0.0, share)?;
+    let (finer, finer_ms) = lit(&finer, &checked, &finer_positions, &doubled, share, 1.0 - share)?;
+    let flat = |colours: &mut dyn Iterator<Item = [f32; 4]>| -> Vec<f32> {
+        colours.flat_map(|[r, g, b, _]| [r, g, b]).collect()
+    };
+    let coarse = flat(&mut checked.iter().map(|i| image.colour[*i]));
+    let fine = flat(&mut finer.colour.into_iter());
+    let convergence = errors(&coarse, &fine, &vec![true; fine.len()]);
+    Ok(ImageReference { image, covered: covered.len(), points, convergence, device_ms: ms + finer_ms })
+}
+
+/// Pixels of an image reference that are computed once more at twice the resolution, which costs eight times as much each.
+const CHECKED_PIXELS: usize = 64;
+
+/// An opacity volume on the device, with the rim that the kernel asks for.
+struct Scene<'a> {
+    gpu: &'a Gpu,
+    kernel: Kernel,
+    field: Field,
+    clearance: gpu::Image,
+}
+
+impl<'a> Scene<'a> {
+    fn new(gpu: &'a Gpu, grid: &Grid, opacity: &[f32]) -> Result<Self> {
+        if opacity.len() != grid.len() || !opacity.iter().all(|a| (0.0..=1.0).contains(a)) {
+            return Err(Error::Config {
+                what: "opacity of a reference".into(),
+                problem: format!(
+                    "{} values; expected one from 0 to 1 for each of {} voxels",
+                    opacity.len(),
+                    grid.len()
+                ),
+            });
+        }
+        let rimmed = Grid { dims: grid.dims.map(|d| d + 2), ..*grid };
+        let mut values = vec![0.0; rimmed.len()];
+        for (row, chunk) in opacity.chunks(grid.dims[0]).enumerate() {
+            let (y, z) = (row % grid.dims[1], row / grid.dims[1]);
+            let first = rimmed.index([1, y + 1, z + 1]);
+            values[first..first + chunk.len()].copy_from_slice(chunk);
+        }
+        let volume = Volume::new(rimmed.dims, rimmed.spacing, Values::F32(values))?;
+        let Values::F32(values) = &volume.values else { unreachable!("made above") };
+        let field = Field::upload(gpu, &volume)?;
+        let clearance = upload_clearance(gpu, &field, values)?;
+        Ok(Self { gpu, kernel: Kernel::new(gpu)?, field, clearance })
+    }
+
+    /// Ambient value at each position (index coordinates inside the volume) and the device's time in ms.
+    fn evaluate(
+        &self,
+        positions: &[[f64; 3]],
+        integral: &Integral,
+        reference_mm: f64,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Vec<f32>, f64)> {
+        if positions.is_empty() {
+            return Ok((Vec::new(), 0.0));
+        }
+        let points = Points::upload(self.gpu, positions, integral.directions)?;
+        // The first part is small enough for any device.
+        let samples = f64::from(integral.directions) * f64::from(integral.samples.max(1));
+        let first = (4e6 / samples).clamp(1.0, 1e6) as u32;
+        let (field, clearance) = (&self.field, &self.clearance);
+        let mut record = |rec: &mut gpu::Recorder, base: u32, now: u32| {
+            self.kernel.record(rec, field, clearance, integral, reference_mm, &points, base, now)
+        };
+        let ms = in_parts(self.gpu, "reference", points.count, first, &mut record, progress)?;
+        Ok((points.read(self.gpu)?, ms))
+    }
+}

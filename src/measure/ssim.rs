@@ -1,0 +1,165 @@
+//! Structural similarity as DVAO measures it (DVAO §3.5, eq. (3); Wang et al. 2004):
+//!
+//! ```text
+//! SSIM = (2 μ_p μ_t + c1)(2 σ_pt + c2) / ((μ_p² + μ_t² + c1)(σ_p² + σ_t² + c2)),   mean over all voxels
+//! ```
+//!
+//! with means, variances and covariance in a neighbourhood of each voxel: in its slice along z for SSIM-2D, in the volume for
+//! SSIM-3D. The paper leaves open:
+//!
+//! * the window: here Wang's, a Gaussian of σ = 1.5 voxels cut at 11, as the authors' published program has it;
+//! * its rim: here only voxels that count have weight, in every window, and only their own windows are averaged. The authors'
+//!   program drops the 5 outermost voxels instead;
+//! * the constants: c1 = 0.01 and c2 = 0.03 as printed, while that program squares them as Wang does. See [`Constants`].
+
+use crate::cpu::Grid;
+
+/// c1 and c2, for values in 0 … 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constants {
+    /// Steadies the comparison of means.
+    pub c1: f64,
+    /// Steadies the comparison of variances.
+    pub c2: f64,
+}
+
+impl Constants {
+    /// DVAO eq. (3) as printed.
+    pub const PRINTED: Self = Self { c1: 0.01, c2: 0.03 };
+    /// Wang et al. 2004 and DVAO's published program, from which the numbers in its tables come: (0.01)² and (0.03)².
+    pub const SQUARED: Self = Self { c1: 1e-4, c2: 9e-4 };
+}
+
+/// Half the window's width in voxels, beside its centre.
+const REACH: usize = 5;
+/// The Gaussian's σ in voxels.
+const SIGMA: f64 = 1.5;
+
+/// SSIM-2D: mean over the voxels that count, each in its slice along z. An image is a volume with one slice.
+///
+/// # Panics
+/// If the lengths are not the number of voxels.
+pub fn ssim_2d(grid: &Grid, found: &[f32], reference: &[f32], counts: &[bool], constants: Constants) -> f64 {
+    ssim(grid, found, reference, counts, constants, &[0, 1])
+}
+
+/// SSIM-3D: mean over the voxels that count, each in its neighbourhood.
+///
+/// # Panics
+/// If the lengths are not the number of voxels.
+pub fn ssim_3d(grid: &Grid, found: &[f32], reference: &[f32], counts: &[bool], constants: Constants) -> f64 {
+    ssim(grid, found, reference, counts, constants, &[0, 1, 2])
+}
+
+fn ssim(
+    grid: &Grid,
+    found: &[f32],
+    reference: &[f32],
+    counts: &[bool],
+    Constants { c1, c2 }: Constants,
+    axes: &[usize],
+) -> f64 {
+    let voxels = grid.len();
+    assert_eq!((found.len(), reference.len(), counts.len()), (voxels, voxels, voxels), "voxels");
+    let moment = |of: fn(f64, f64) -> f64| {
+        let values = (0..voxels).map(|i| {
+            // What does not count may be NaN.
+            if counts[i] { of(f64::from(found[i]), f64::from(reference[i])) } else { 0.0 }
+        });
+        let mut field: Vec<f64> = values.collect();
+        axes.iter().for_each(|&axis| blur(grid, &mut field, axis));
+        field
+    };
+    let weight = moment(|_, _| 1.0);
+    let (p, t) = (moment(|p, _| p), moment(|_, t| t));
+    let (pp, tt, pt) = (moment(|p, _| p * p), moment(|_, t| t * t), moment(|p, t| p * t));
+    let (mut sum, mut count) = (0.0, 0);
+    for i in (0..voxels).filter(|&i| counts[i]) {
+        let mean = |field: &[f64]| field[i] / weight[i];
+        let (mp, mt) = (mean(&p), mean(&t));
+        let (vp, vt, c) = (mean(&pp) - mp * mp, mean(&tt) - mt * mt, mean(&pt) - mp * mt);
+        sum += (2.0 * mp * mt + c1) * (2.0 * c + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2));
+        count += 1;
+    }
+    sum / f64::from(count)
+}
+
+/// Weighted sum along one axis; nothing lies outside. The weights need no norm: it is that of [`ssim`]'s `weight`.
+fn blur(grid: &Grid, field: &mut Vec<f64>, axis: usize) {
+    let gauss: [f64; REACH + 1] = std::array::from_fn(|d| (-((d * d) as f64) / (2.0 * SIGMA * SIGMA)).exp());
+    let stride = grid.dims[..axis].iter().product::<usize>();
+    let blurred = (0..field.len()).map(|i| {
+        let at = i / stride % grid.dims[axis];
+        let reach = at.saturating_sub(REACH)..=(at + REACH).min(grid.dims[axis] - 1);
+        reach.map(|j| gauss[j.abs_diff(at)] * field[i + j * stride - at * stride]).sum()
+    });
+    *field = blurred.collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::random::Random;
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    }
+
+    const SHORT: Grid = Grid { dims: [2, 1, 1], spacing: [1.0; 3] };
+
+    /// Two constant fields: no variance, so that only the means count.
+    #[test]
+    fn constant_fields_by_hand() {
+        let grid = Grid { dims: [4, 5, 3], spacing: [1.0; 3] };
+        let (p, t, all) = (vec![0.5; 60], vec![0.25; 60], vec![true; 60]);
+        for c in [Constants::PRINTED, Constants::SQUARED] {
+            let expected = (2.0 * 0.125 + c.c1) / (0.25 + 0.0625 + c.c1);
+            close(ssim_2d(&grid, &p, &t, &all, c), expected);
+            close(ssim_3d(&grid, &p, &t, &all, c), expected);
+        }
+    }
+
+    /// Two voxels have weights 1 and g = exp(−1/4.5) in the first one's window, and the other way round in the second's.
+    #[test]
+    fn two_voxels_by_hand() {
+        let Constants { c1, c2 } = Constants::PRINTED;
+        let g = (-1.0_f64 / 4.5).exp();
+        let (a, b) = (1.0 / (1.0 + g), g / (1.0 + g));
+        // p = (1, 0), t = (0, 1): means a, b and b, a; variances ab; covariance −ab.
+        let expected = (2.0 * a * b + c1) * (c2 - 2.0 * a * b) / ((a * a + b * b + c1) * (2.0 * a * b + c2));
+        let found = ssim_3d(&SHORT, &[1.0, 0.0], &[0.0, 1.0], &[true; 2], Constants::PRINTED);
+        close(found, expected);
+        assert!(found < -0.7);
+        // Where only one voxel counts, it is alone in its window.
+        let found = ssim_3d(&SHORT, &[1.0, f32::NAN], &[0.5, f32::NAN], &[true, false], Constants::PRINTED);
+        close(found, (1.0 + c1) / (1.25 + c1));
+    }
+
+    #[test]
+    fn equal_fields_are_alike_and_shuffled_ones_are_not() {
+        let grid = Grid { dims: [13, 12, 14], spacing: [1.0; 3] };
+        let mut random = Random::new(4);
+        let field: Vec<f32> = (0..grid.len()).map(|_| random.between(0.0, 1.0)).collect();
+        let counts: Vec<bool> = (0..grid.len()).map(|_| random.below(4) != 0).collect();
+        let mut turned = field.clone();
+        turned.rotate_left(5);
+        for ssim in [ssim_2d, ssim_3d] {
+            close(ssim(&grid, &field, &field, &counts, Constants::SQUARED), 1.0);
+            assert!(ssim(&grid, &turned, &field, &counts, Constants::SQUARED) < 0.2);
+        }
+    }
+
+    /// Slices of even brightness, each 0.2 brighter than it should be on odd slices: in a slice there is no structure to
+    /// lose, along z there is.
+    #[test]
+    fn only_the_third_axis_sees_structure_along_it() {
+        let grid = Grid { dims: [3, 3, 12], spacing: [1.0; 3] };
+        let reference = vec![0.5; grid.len()];
+        let found: Vec<f32> =
+            (0..grid.len()).map(|i| if grid.voxel(i)[2] % 2 == 1 { 0.7 } else { 0.5 }).collect();
+        let all = vec![true; grid.len()];
+        let flat = ssim_2d(&grid, &found, &reference, &all, Constants::SQUARED);
+        let deep = ssim_3d(&grid, &found, &reference, &all, Constants::SQUARED);
+        assert!(flat > 0.95 && deep < 0.2, "{flat} {deep}");
+    }
+}

@@ -1,0 +1,204 @@
+//! Converged ambient occlusion at given points (measure.md §1): the mean over very many directions of
+//! `1/(R − o) ∫_o^R exp(−∫_o^s τ) ds`, τ = −ln(1 − a)/ℓ of the trilinear opacity, in very short steps; or of the sum of CAO eq. (2).
+//!
+//! In: opacity and its clearance, each with a rim of one transparent voxel; points in index coordinates; an [`Integral`].
+//! Out: an f32 a point. Cost: 8 texel reads for each direction and step in or near opacity; steps through what is clear are skipped.
+
+use super::field::Field;
+use super::{device_buffer, row_of_groups};
+use crate::gpu::{
+    Access, Bind, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline, Recorder,
+    shaders,
+};
+use crate::layout_check;
+use crate::occlusion::{Integral, fibonacci};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    samples: u32,
+    per_mm: [f32; 3],
+    directions: u32,
+    first: f32,
+    step: f32,
+    exponent: f32,
+    rule: u32,
+    base: u32,
+    count: u32,
+    pad: [u32; 2],
+}
+layout_check!(Params => shaders::reference::REFERENCE_PARAMS {
+    dims, samples, per_mm, directions, first, step, exponent, rule, base, count
+});
+
+/// The kernel `reference`.
+pub struct Reference {
+    pipeline: Pipeline,
+}
+
+/// Points to evaluate, the directions, and the values found.
+pub struct Points {
+    directions: Buffer,
+    at: Buffer,
+    found: Buffer,
+    direction_count: u32,
+    /// Number of points.
+    pub count: u32,
+}
+
+impl Points {
+    /// Copies points (index coordinates of the volume without its rim) and directions to the device. Uses the device's queue
+    /// and waits for it.
+    pub fn upload(gpu: &Gpu, positions: &[[f64; 3]], directions: u32) -> Result<Self> {
+        if positions.is_empty() || directions == 0 {
+            return Err(Error::Config {
+                what: "reference".into(),
+                problem: format!(
+                    "{} points and {directions} directions; expected at least 1 of each",
+                    positions.len()
+                ),
+            });
+        }
+        // The rim moves every voxel by one.
+        let at: Vec<[f32; 4]> =
+            positions.iter().map(|p| [p[0], p[1], p[2], 0.0].map(|c| c as f32 + 1.0)).collect();
+        let mut units = fibonacci(directions);
+        // Neighbours in the list, which a device works on side by side, take ways of similar length.
+        units.sort_by_key(octant_order);
+        let units: Vec<[f32; 4]> = units.iter().map(|d| [d[0], d[1], d[2], 0.0].map(|c| c as f32)).collect();
+        Ok(Self {
+            directions: device_buffer(gpu, "reference directions", bytemuck::cast_slice(&units))?,
+            found: gpu.buffer("reference found", 4 * at.len() as u64, BufferUse::Device)?,
+            direction_count: directions,
+            count: at.len() as u32,
+            at: device_buffer(gpu, "reference points", bytemuck::cast_slice(&at))?,
+        })
+    }
+
+    /// The values found. Uses the device's queue and waits for it.
+    pub fn read(&self, gpu: &Gpu) -> Result<Vec<f32>> {
+        let bytes = self.found.bytes();
+        let read_back = gpu.buffer("reference read-back", bytes, BufferUse::Readback)?;
+        let mut rec = gpu.recorder("read reference")?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        rec.copy_buffer(&self.found, 0, &read_back, 0, bytes)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        Ok(bytemuck::pod_collect_to_vec(&read_back.read(0, bytes)?))
+    }
+}
+
+/// Place on a curve that fills the directions cell by cell: octant first, then interleaved bits of the coordinates.
+fn octant_order(d: &[f64; 3]) -> u32 {
+    let cell = d.map(|c| ((c * 0.5 + 0.5) * 15.999) as u32);
+    (0..4).rev().fold(0, |code, bit| cell.iter().fold(code, |code, c| code << 1 | (c >> bit & 1)))
+}
+
+/// `clearance`: steps of one voxel, diagonals included, from each voxel to the nearest one with opacity, at most 255; as an
+/// image of the field's size. Uses the device's queue and waits for it.
+pub fn upload_clearance(gpu: &Gpu, field: &Field, opacity: &[f32]) -> Result<Image> {
+    let usage = ImageUse::SAMPLED;
+    let desc = ImageDesc { dims: field.dims, layers: 1, format: Format::R8Uint, kind: ImageKind::D3, usage };
+    let image = gpu.image("clearance", &desc)?;
+    let clear = clearance(field.dims.map(|d| d as usize), opacity);
+    let staging = gpu.buffer("clearance staging", clear.len() as u64, BufferUse::Upload)?;
+    staging.write(0, &clear)?;
+    let mut rec = gpu.recorder("upload clearance")?;
+    rec.discard(&image);
+    rec.barrier(&[], &[Access::TransferWrite]);
+    rec.copy_buffer_to_image(&staging, 0, &image, [0; 3], field.dims)?;
+    rec.submit_and_wait()?;
+    Ok(image)
+}
+
+/// Two sweeps over the voxels, each taking what the 13 neighbours before it have.
+fn clearance([nx, ny, nz]: [usize; 3], opacity: &[f32]) -> Vec<u8> {
+    let mut clear: Vec<u8> = opacity.iter().map(|a| if *a > 0.0 { 0 } else { 255 }).collect();
+    let neighbours = |i: usize| {
+        let at = [i % nx, i / nx % ny, i / nx / ny].map(|c| c as isize);
+        (0..13_isize).filter_map(move |n| {
+            let [x, y, z] = [at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1];
+            let inside = |c: isize, n: usize| (0..n as isize).contains(&c);
+            (inside(x, nx) && inside(y, ny) && inside(z, nz))
+                .then(|| (z as usize * ny + y as usize) * nx + x as usize)
+        })
+    };
+    let last = opacity.len() - 1;
+    // The neighbours after a voxel are those before it in the reversed volume.
+    for place in [|i: usize, _: usize| i, |i: usize, last: usize| last - i] {
+        for i in 0..opacity.len() {
+            let least = neighbours(i).map(|n| clear[place(n, last)]).min().unwrap_or(255);
+            let own = &mut clear[place(i, last)];
+            *own = (*own).min(least.saturating_add(1));
+        }
+    }
+    clear
+}
+
+impl Reference {
+    /// Builds the pipeline.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { pipeline: gpu.compute(&shaders::reference::SHADER, "main")? })
+    }
+
+    /// Evaluates `count` points from `base` on. `field` is the opacity, `clearance` from [`upload_clearance`], both with
+    /// their rim.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        clearance: &Image,
+        integral: &Integral,
+        reference_mm: f64,
+        points: &Points,
+        base: u32,
+        count: u32,
+    ) -> Result<()> {
+        let params = Params {
+            dims: field.dims,
+            samples: integral.samples,
+            per_mm: field.spacing.map(f32::recip),
+            directions: points.direction_count,
+            first: integral.first_mm as f32,
+            step: integral.step_mm as f32,
+            exponent: (integral.step_mm / reference_mm) as f32,
+            rule: integral.rule as u32,
+            base,
+            count,
+            pad: [0; 2],
+        };
+        let binds = [
+            ("opacity", Bind::Image(&field.volume)),
+            ("clearance", Bind::Image(clearance)),
+            ("directions", Bind::Buffer(&points.directions)),
+            ("points", Bind::Buffer(&points.at)),
+            ("found", Bind::Buffer(&points.found)),
+        ];
+        rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), row_of_groups(count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clearance_is_the_largest_step_along_an_axis() {
+        let dims = [7, 5, 6];
+        let solid = [[1, 2, 3], [6, 4, 0]];
+        let mut opacity = vec![0.0; 210];
+        assert!(clearance(dims, &opacity).iter().all(|c| *c == 255));
+        for [x, y, z] in solid {
+            opacity[(z * 5 + y) * 7 + x] = 0.1;
+        }
+        for (i, found) in clearance(dims, &opacity).into_iter().enumerate() {
+            let at = [i % 7, i / 7 % 5, i / 35];
+            let to = |s: [usize; 3]| (0..3).map(|a| at[a].abs_diff(s[a])).max().unwrap();
+            assert_eq!(usize::from(found), solid.map(to).into_iter().min().unwrap(), "{at:?}");
+        }
+    }
+}
