@@ -1,4 +1,4 @@
-// Stage 6 of CAO section 3.5: the volume by ray casting, both eyes in one multiview pass. Front to back, early
+// Stage 6 of CAO section 3.5: the volume by ray casting, all views in one multiview pass. Front to back, early
 // termination, bricks without opacity skipped, clipped samples skipped by the shadow test of section 3.2, ambient factor
 // from V_AO at every sample that shows anything.
 
@@ -19,7 +19,7 @@
 #include "shared/eyes.wgsl"
 
 struct RaycastParams {
-    // pixels of one eye
+    // pixels of one view
     size: vec2<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! The frame: what changed, which stages run for it, both eyes drawn.
+//! The frame: what changed, which stages run for it, all views drawn.
 //!
 //! ```text
 //! volume ─ [opacity] ─ [classify: clips] ─ [bricks] ─ [lao: full or contextual] ─ [raycast, both eyes]
@@ -20,7 +20,7 @@ use crate::stage::clips::{ClipSet, MapSettings};
 use crate::stage::compare::{Compare, Difference};
 use crate::stage::consistency::{Consistency, Seen};
 use crate::stage::dilate::Dilate;
-use crate::stage::eyes::{FrameBuffer, Look};
+use crate::stage::eyes::{FrameBuffer, Look, check_count};
 use crate::stage::field::Field;
 use crate::stage::lao::Scope;
 use crate::stage::occupancy::Occupancy;
@@ -76,15 +76,15 @@ pub struct Categories {
     pub untouched: u32,
 }
 
-/// A pair of images read back from the device.
+/// The images of all views, left and right first, read back from the device.
 #[derive(Clone, Debug)]
-pub struct StereoImage {
-    /// Width and height of one eye in pixels.
+pub struct StereoImage<const VIEWS: usize = 2> {
+    /// Width and height of one view in pixels.
     pub size: [u32; 2],
-    /// Left and right: premultiplied linear RGBA, rows from the top.
-    pub colour: [Vec<[f32; 4]>; 2],
-    /// Left and right: Vulkan depth, 1 where nothing is drawn.
-    pub depth: [Vec<f32>; 2],
+    /// Of each view: premultiplied linear RGBA, rows from the top.
+    pub colour: [Vec<[f32; 4]>; VIEWS],
+    /// Of each view: Vulkan depth, 1 where nothing is drawn.
+    pub depth: [Vec<f32>; VIEWS],
 }
 
 /// What has to be brought up to date.
@@ -390,11 +390,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// Records both eyes into the two layers of `colour` and `depth` (`D32Float`). Refuses while the ambient volume is out of date.
+    /// Records one to four views ([`View::MAX`]) into as many layers of `colour` and `depth` (`D32Float`), in one multiview pass. Refuses
+    /// while the ambient volume is out of date. Numbers other than two build a pipeline when they first come.
     pub fn record_draw(
         &self,
         rec: &mut Recorder,
-        views: &[View; 2],
+        views: &[View],
         look: &Look,
         colour: &Image,
         depth: &Image,
@@ -413,14 +414,21 @@ impl Renderer {
             clips: &self.clip_set,
             frame: &self.frame,
         };
-        self.raycast.record(rec, bindings, colour, depth, size)?;
+        self.raycast.record(rec, bindings, views.len(), colour, depth, size)?;
         rec.end_stage()?;
         Ok(())
     }
 
-    /// Draws both eyes on the device's own queue and reads them back. Refuses while the ambient volume is out of date.
-    pub fn draw(&self, views: &[View; 2], look: &Look, size: [u32; 2]) -> Result<(StereoImage, Timings)> {
+    /// Draws both eyes, or any one to four views ([`View::MAX`]), on the device's own queue and reads them back. Refuses while the ambient
+    /// volume is out of date.
+    pub fn draw<const VIEWS: usize>(
+        &self,
+        views: &[View; VIEWS],
+        look: &Look,
+        size: [u32; 2],
+    ) -> Result<(StereoImage<VIEWS>, Timings)> {
         self.current()?;
+        check_count(VIEWS)?;
         if size.contains(&0) {
             return Err(Error::Config {
                 what: "image size".into(),
@@ -432,7 +440,7 @@ impl Renderer {
                 name,
                 &ImageDesc {
                     dims: [size[0], size[1], 1],
-                    layers: 2,
+                    layers: VIEWS as u32,
                     format,
                     kind: ImageKind::D2,
                     usage: ImageUse::ATTACHMENT | extra,
@@ -443,8 +451,8 @@ impl Renderer {
         let depth = target("depth", Format::D32Float, ImageUse::SAMPLED)?;
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let read_back = |bytes| self.gpu.buffer("image read-back", bytes, BufferUse::Readback);
-        let colours = [read_back(16 * pixels)?, read_back(16 * pixels)?];
-        let depths = [read_back(4 * pixels)?, read_back(4 * pixels)?];
+        let colours = (0..VIEWS).map(|_| read_back(16 * pixels)).collect::<Result<Vec<_>>>()?;
+        let depths = (0..VIEWS).map(|_| read_back(4 * pixels)).collect::<Result<Vec<_>>>()?;
 
         let mut rec = self.gpu.recorder("draw")?;
         rec.discard(&colour);
@@ -452,7 +460,7 @@ impl Renderer {
         rec.barrier(&[], &[Access::AttachmentWrite]);
         self.record_draw(&mut rec, views, look, &colour, &depth, size)?;
         rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
-        for eye in 0..2 {
+        for eye in 0..VIEWS {
             let extent = [size[0], size[1], 1];
             rec.copy_image_to_buffer(&colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
             rec.copy_image_to_buffer(&depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
@@ -460,18 +468,16 @@ impl Renderer {
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         let timings = rec.submit_and_wait()?;
 
-        let read = |buffer: &Buffer| buffer.read(0, buffer.bytes());
-        let image = StereoImage {
+        let mut image = StereoImage {
             size,
-            colour: [
-                bytemuck::pod_collect_to_vec(&read(&colours[0])?),
-                bytemuck::pod_collect_to_vec(&read(&colours[1])?),
-            ],
-            depth: [
-                bytemuck::pod_collect_to_vec(&read(&depths[0])?),
-                bytemuck::pod_collect_to_vec(&read(&depths[1])?),
-            ],
+            colour: std::array::from_fn(|_| Vec::new()),
+            depth: std::array::from_fn(|_| Vec::new()),
         };
+        for view in 0..VIEWS {
+            let read = |buffer: &Buffer| buffer.read(0, buffer.bytes());
+            image.colour[view] = bytemuck::pod_collect_to_vec(&read(&colours[view])?);
+            image.depth[view] = bytemuck::pod_collect_to_vec(&read(&depths[view])?);
+        }
         Ok((image, timings))
     }
 

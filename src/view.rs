@@ -1,4 +1,5 @@
-//! Eyes: pose and field-of-view tangents as OpenXR gives them, and the stereo rig of a scene file.
+//! Eyes: pose and field-of-view tangents as OpenXR gives them, the stereo rig of a scene file, and the insets of displays with
+//! four views.
 
 use crate::{Error, Result};
 use glam::{Mat3, Mat4, Quat, Vec2, Vec3, Vec4};
@@ -33,6 +34,30 @@ pub struct View {
 }
 
 impl View {
+    /// Most views that are drawn at once: two eyes, and an inset for each.
+    pub const MAX: usize = 4;
+
+    /// The inset of this view around the middle of its field of view: the same pose, `share` (0 … 1) of the extent of each
+    /// tangent, so that its pixels are `1 / share` times as dense.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a share that leaves nothing or is larger than the view.
+    pub fn inset(&self, share: f32) -> Result<Self> {
+        if !(share > 0.0 && share <= 1.0) {
+            return Err(Error::Config {
+                what: "inset".into(),
+                problem: format!("{share} of the field of view; expected 0 < share <= 1"),
+            });
+        }
+        let t = self.tan;
+        let within = |a: f32, b: f32| {
+            let (middle, half) = (0.5 * (a + b), 0.5 * share * (b - a));
+            (middle - half, middle + half)
+        };
+        let ((left, right), (down, up)) = (within(t.left, t.right), within(t.down, t.up));
+        Ok(Self { tan: Tangents { left, right, up, down }, ..*self })
+    }
+
     /// Refuses fields of view, planes and poses that no projection has.
     pub fn check(&self) -> Result<()> {
         let t = self.tan;
@@ -184,6 +209,17 @@ impl StereoRig {
     }
 }
 
+/// The four views of a display with an inset for each eye, in OpenXR's order (`XR_VARJO_quad_views`; in OpenXR 1.1
+/// `XR_VIEW_CONFIGURATION_TYPE_PRIMARY_STEREO_WITH_FOVEATED_INSET`): left and right of `eyes`, then the inset of the left and of the
+/// right. The insets take `share` of the field of view along each direction ([`View::inset`]).
+///
+/// # Errors
+/// As [`View::inset`].
+pub fn with_insets(eyes: [View; 2], share: f32) -> Result<[View; 4]> {
+    let [left, right] = eyes;
+    Ok([left, right, left.inset(share)?, right.inset(share)?])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -248,6 +284,25 @@ mod tests {
         let (_, direction) = view.ray(Vec2::ZERO);
         let local = view.orientation.inverse() * direction;
         assert!(local.x < 0.0 && local.y > 0.0 && (local.z + 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_inset_shows_the_middle_of_its_view_larger() {
+        let eyes = rig().views(1.2, 1.0, 1000.0).unwrap();
+        let views = with_insets(eyes, 0.4).unwrap();
+        assert_eq!(views[..2], eyes);
+        for (inset, outer) in [(views[2], views[0]), (views[3], views[1])] {
+            assert_eq!((inset.position, inset.orientation), (outer.position, outer.orientation));
+            for uv in [Vec2::splat(0.5), Vec2::new(0.35, 0.62)] {
+                let (origin, direction) = outer.ray(uv);
+                let (found, _) = inset.project(origin + direction * 200.0).unwrap();
+                assert!((found - (0.5 + (uv - 0.5) / 0.4)).length() < 1e-4, "{uv} {found}");
+            }
+        }
+        assert_eq!(eyes[0].inset(1.0).unwrap().projection(), eyes[0].projection());
+        for share in [0.0, -0.5, 1.5, f32::NAN] {
+            assert!(eyes[0].inset(share).unwrap_err().to_string().starts_with("inset"), "{share}");
+        }
     }
 
     #[test]

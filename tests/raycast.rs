@@ -24,7 +24,7 @@ use cao::stage::peel::Peel;
 use cao::stage::raycast::{Bindings, Raycast};
 use cao::stage::transfer::TransferBuffer;
 use cao::transfer::TransferFunction;
-use cao::view::{StereoRig, Tangents, View};
+use cao::view::{StereoRig, Tangents, View, with_insets};
 use cao::volume::Volume;
 use cao::volume::builtin::builtin_box;
 use common::*;
@@ -325,10 +325,7 @@ fn equal_eyes_see_equal_pictures_bit_for_bit() {
     renderer.update(&mut |_| ()).unwrap();
     for azimuth in [0.0, 50.0, 200.0] {
         let [left, right] = framing(&volume, azimuth, 20.0);
-        let bits = |image: &StereoImage, eye: usize| -> (Vec<u32>, Vec<u32>) {
-            let colour = image.colour[eye].iter().flatten().map(|c| c.to_bits()).collect();
-            (colour, image.depth[eye].iter().map(|d| d.to_bits()).collect())
-        };
+        let bits = view_bits::<2>;
         let same = renderer.draw(&[left, left], &Look::default(), SIZE).unwrap().0;
         assert!(bits(&same, 0) == bits(&same, 1));
         // And what an eye sees does not depend on the other eye, or on which of the two it is.
@@ -338,6 +335,94 @@ fn equal_eyes_see_equal_pictures_bit_for_bit() {
         assert!(bits(&both, 0) == bits(&swapped, 1) && bits(&both, 1) == bits(&swapped, 0));
         assert!(bits(&both, 0) != bits(&both, 1));
     }
+    drop(renderer);
+    close(gpu);
+}
+
+/// One view's colour and depth as bits.
+fn view_bits<const VIEWS: usize>(image: &StereoImage<VIEWS>, view: usize) -> (Vec<u32>, Vec<u32>) {
+    let colour = image.colour[view].iter().flatten().map(|c| c.to_bits()).collect();
+    (colour, image.depth[view].iter().map(|d| d.to_bits()).collect())
+}
+
+/// What a view shows depends on nothing but the view: one, two, three or four at once give the pixels that it has as an eye of
+/// two, whatever its place among them.
+#[test]
+fn one_to_four_views_show_what_each_shows_as_an_eye_of_two() {
+    let gpu = open();
+    let volume = builtin_box("fruit", [24, 20, 22], [1.0, 1.1, 0.9]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup(MAPS), COLOUR).unwrap();
+    let pose = Pose { translate_mm: Vec3::new(5.0, -8.0, 4.0), scale: Vec3::splat(8.0), ..Pose::default() };
+    renderer.set_clips(&[Clip { pose, ..Clip::remove(Shape::Sphere) }]).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let look = Look { step_mm: Some(0.4), ..Look::default() };
+    let eyes = framing(&volume, 40.0, 20.0);
+    let four = with_insets(eyes, 0.45).unwrap();
+    let [a, b, c, d] = four;
+    let pair = |first, second| renderer.draw(&[first, second], &look, SIZE).unwrap().0;
+    let (outer, inner) = (pair(a, b), pair(c, d));
+    let expected = [(&outer, 0), (&outer, 1), (&inner, 0), (&inner, 1)].map(|(i, eye)| view_bits(i, eye));
+    for (n, picture) in expected.iter().enumerate() {
+        // An insensitive comparison would take any picture for any other.
+        assert!(expected[..n].iter().all(|other| other != picture), "view {n} is another one");
+    }
+
+    let all = renderer.draw(&four, &look, SIZE).unwrap().0;
+    let turned = renderer.draw(&[d, c, b, a], &look, SIZE).unwrap().0;
+    let three = renderer.draw(&[c, a, d], &look, SIZE).unwrap().0;
+    for (n, expected) in expected.iter().enumerate() {
+        assert!(view_bits(&all, n) == *expected, "view {n} of four");
+        assert!(view_bits(&turned, 3 - n) == *expected, "view {n} of four, in reverse");
+        assert!(
+            view_bits(&renderer.draw(&[four[n]], &look, SIZE).unwrap().0, 0) == *expected,
+            "view {n} alone"
+        );
+    }
+    for (place, n) in [2, 0, 3].into_iter().enumerate() {
+        assert!(view_bits(&three, place) == expected[n], "view {n} of three");
+    }
+    drop(renderer);
+    close(gpu);
+}
+
+/// Counts that no pass can draw, and images with fewer layers than views, are refused; more layers than views do no harm.
+#[test]
+fn views_that_do_not_fit_are_refused_by_name() {
+    let gpu = open();
+    let volume = builtin_box("engine", [12, 10, 9], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup(MAPS), COLOUR).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let look = Look::default();
+    let [left, right] = framing(&volume, 40.0, 20.0);
+    let five = renderer.draw(&[left; 5], &look, SIZE).unwrap_err().to_string();
+    assert!(five.contains("views") && five.contains('5') && five.contains('4'), "{five}");
+    let none = renderer.draw(&[], &look, SIZE).unwrap_err().to_string();
+    assert!(none.contains("views") && none.contains("at least one"), "{none}");
+
+    let target = |layers, format| {
+        let dims = [SIZE[0], SIZE[1], 1];
+        let usage = ImageUse::ATTACHMENT;
+        gpu.image("host's", &ImageDesc { dims, layers, format, kind: ImageKind::D2, usage }).unwrap()
+    };
+    let record = |views: &[View], layers| -> cao::Result<()> {
+        let (colour, depth) = (target(layers, COLOUR), target(layers, Format::D32Float));
+        let mut rec = gpu.recorder("host's frame").unwrap();
+        rec.discard(&colour);
+        rec.discard(&depth);
+        rec.barrier(&[], &[Access::AttachmentWrite]);
+        renderer.record_draw(&mut rec, views, &look, &colour, &depth, SIZE)?;
+        rec.submit_and_wait().map(drop)
+    };
+    for (views, layers) in
+        [(&[left][..], 1), (&[left, right], 2), (&[left, right, left, right], 4), (&[left], 3)]
+    {
+        record(views, layers).unwrap();
+    }
+    let few = record(&[left, right, left, right], 2).unwrap_err().to_string();
+    assert!(few.contains("needs 4 layers") && few.contains("has 2"), "{few}");
+    assert!(record(&[left; 6], 6).unwrap_err().to_string().contains("views"));
     drop(renderer);
     close(gpu);
 }
@@ -407,7 +492,7 @@ impl Stages {
             rec.discard(&depth);
             self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
             rec.barrier(&[], &[Access::AttachmentWrite]);
-            self.raycast.record(rec, bindings, &colour, &depth, SIZE).unwrap();
+            self.raycast.record(rec, bindings, views.len(), &colour, &depth, SIZE).unwrap();
             rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
             for (n, back) in backs.iter().enumerate() {
                 let image = if n < 2 { &colour } else { &depth };

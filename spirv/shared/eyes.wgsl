@@ -1,4 +1,4 @@
-// Eyes and the frame's settings. World is millimetres with the volume's centre at the origin.
+// Views and the frame's settings. World is millimetres with the volume's centre at the origin.
 
 struct Eye {
     // position in mm
@@ -15,7 +15,8 @@ struct Eye {
 }
 
 struct Frame {
-    eye: array<Eye, 2>,
+    // one a view, in the order of the image's layers; left and right eye first
+    eye: array<Eye, 4>,
     // voxels along each axis
     dims: vec4<f32>,
     // mm; w: step along the ray in mm

@@ -1,7 +1,9 @@
 //! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and where methods stop holding.
 
+pub mod contender;
 pub mod error;
 pub mod exactness;
+pub mod plot;
 pub mod random;
 pub mod reference;
 pub mod ssim;

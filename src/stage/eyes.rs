@@ -23,7 +23,7 @@ layout_check!(Eye => shaders::raycast::EYE { origin, base, along_u, along_v, dep
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Frame {
-    eye: [Eye; 2],
+    eye: [Eye; View::MAX],
     dims: [f32; 4],
     spacing: [f32; 4],
     light: [f32; 4],
@@ -97,6 +97,20 @@ fn checked_step(field: &Field, look: &Look) -> Result<f32> {
     })
 }
 
+/// Refuses what is no count of views.
+pub fn check_count(views: usize) -> Result<()> {
+    match views {
+        0 => Err(Error::Config { what: "views".into(), problem: "none; expected at least one".into() }),
+        1..=View::MAX => Ok(()),
+        _ => Err(Error::Limit {
+            what: "views drawn at once".into(),
+            needed: views as u64,
+            limit: View::MAX as u64,
+            hint: "draw them in several passes".into(),
+        }),
+    }
+}
+
 impl Look {
     fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
@@ -124,7 +138,7 @@ impl Look {
     }
 }
 
-/// Both eyes and the frame's settings in device memory.
+/// The views and the frame's settings in device memory.
 pub struct FrameBuffer {
     /// Bound as `frame`.
     pub buffer: Buffer,
@@ -137,15 +151,17 @@ impl FrameBuffer {
     }
 
     /// Writes the frame and makes it visible to all shaders. Fails on impossible values in `views` or `look`, and with
-    /// [`Error::Limit`] where the step is so small that a ray has more than 10⁵ samples.
+    /// [`Error::Limit`] where the step is so small that a ray has more than 10⁵ samples, or for more views than
+    /// [`View::MAX`].
     pub fn record(
         &self,
         rec: &mut Recorder,
         field: &Field,
-        views: &[View; 2],
+        views: &[View],
         look: &Look,
         reference_mm: f32,
     ) -> Result<()> {
+        check_count(views.len())?;
         look.check()?;
         let step = checked_step(field, look)?;
         let mut data = Frame::zeroed();

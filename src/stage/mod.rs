@@ -15,6 +15,7 @@ pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod reference;
+pub mod ssao;
 pub mod transfer;
 
 use crate::Result;

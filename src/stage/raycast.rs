@@ -1,11 +1,11 @@
-//! Stage 6 of CAO §3.5: both eyes by ray casting, in one multiview pass into a two-layer image.
+//! Stage 6 of CAO §3.5: all views by ray casting, in one multiview pass into an image of a layer each.
 //!
 //! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i c_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, `L = A(x)·(k_a + k_d |n·l|)`. In: `volume`, `transfer`,
 //! `opacity` V_o (gradients), `ambient` V_AO, `occupancy`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
 //! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
 
 use super::clips::ClipSet;
-use super::eyes::FrameBuffer;
+use super::eyes::{FrameBuffer, check_count};
 use super::field::Field;
 use super::transfer::TransferBuffer;
 use crate::Result;
@@ -14,7 +14,9 @@ use crate::gpu::{
     Sampler, SamplerDesc, shaders,
 };
 use crate::layout_check;
+use crate::view::View;
 use bytemuck::{Pod, Zeroable};
+use std::sync::OnceLock;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -44,39 +46,59 @@ pub struct Bindings<'a> {
 
 /// The kernel `raycast`.
 pub struct Raycast {
-    pipeline: Pipeline,
+    gpu: Gpu,
+    colour: Format,
+    /// By number of views, less one: a pipeline's view mask is fixed.
+    pipelines: [OnceLock<Pipeline>; View::MAX],
     field: Sampler,
     edge: Sampler,
 }
 
 impl Raycast {
-    /// Builds the pipeline for a colour attachment of this format and a depth attachment `D32Float`, two layers each.
+    /// Builds the pipeline for two views, a colour attachment of this format and a depth attachment `D32Float`.
     pub fn new(gpu: &Gpu, colour: Format) -> Result<Self> {
-        Ok(Self {
-            pipeline: gpu.graphics(
-                &shaders::raycast::SHADER,
-                &GraphicsDesc {
-                    vertex: "vertex",
-                    fragment: "fragment",
-                    colours: &[colour],
-                    depth: Some(Format::D32Float),
-                    depth_test: DepthTest::Always,
-                    depth_write: true,
-                    cull: Cull::None,
-                    view_mask: 0b11,
-                    ..GraphicsDesc::default()
-                },
-            )?,
+        let raycast = Self {
+            gpu: gpu.clone(),
+            colour,
+            pipelines: Default::default(),
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
-        })
+        };
+        raycast.pipeline(2)?;
+        Ok(raycast)
     }
 
-    /// Draws both eyes over the whole of both layers.
+    /// The pipeline for this many views, built when it is first asked for.
+    fn pipeline(&self, views: usize) -> Result<&Pipeline> {
+        check_count(views)?;
+        let slot = &self.pipelines[views - 1];
+        if let Some(pipeline) = slot.get() {
+            return Ok(pipeline);
+        }
+        let pipeline = self.gpu.graphics(
+            &shaders::raycast::SHADER,
+            &GraphicsDesc {
+                vertex: "vertex",
+                fragment: "fragment",
+                colours: &[self.colour],
+                depth: Some(Format::D32Float),
+                depth_test: DepthTest::Always,
+                depth_write: true,
+                cull: Cull::None,
+                view_mask: (1 << views) - 1,
+                ..GraphicsDesc::default()
+            },
+        )?;
+        Ok(slot.get_or_init(|| pipeline))
+    }
+
+    /// Draws the first `views` views of the frame over the whole of as many layers. A number other than two builds its pipeline
+    /// when it first comes. Fails for more views than [`View::MAX`] or than the images have layers.
     pub fn record(
         &self,
         rec: &mut Recorder,
         bindings: Bindings,
+        views: usize,
         colour: &Image,
         depth: &Image,
         size: [u32; 2],
@@ -101,6 +123,6 @@ impl Raycast {
             layer: None,
             size,
         };
-        rec.draw(&self.pipeline, &binds, bytemuck::bytes_of(&params), attachments, 6)
+        rec.draw(self.pipeline(views)?, &binds, bytemuck::bytes_of(&params), attachments, 6)
     }
 }

@@ -1,28 +1,14 @@
-//! Flags and their meaning, one place for all commands.
+//! Flags and their meaning, one place for all commands. Those that the programs share are in `common`.
 
+pub use crate::common::args::{Global, Raw, Settings, open, setup, shape, usage};
+use crate::common::args::{length, number, size, three, triple};
 use anyhow::{Context, Result};
-use cao::clip::{Clip, Mode, Pose, Shape};
+use cao::clip::{Clip, Mode, Pose};
 use cao::measure::stability::Sweep;
-use cao::mesh::TriangleMesh;
-use cao::occlusion::{Quadrature, RaySet};
-use cao::scene::{Method, VolumeSource};
-use cao::volume::{Endian, Volume};
+use cao::scene::Method;
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
-use std::fmt::Display;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
-use std::sync::Arc;
-
-/// Flags that contradict each other, beyond what the parser of the command line can tell: exit code 2.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct Usage(String);
-
-/// A [`Usage`] error.
-pub fn usage(problem: impl Into<String>) -> anyhow::Error {
-    Usage(problem.into()).into()
-}
+use std::path::PathBuf;
 
 /// Volumes with ambient occlusion, for both eyes, exact under clipping.
 #[derive(Parser)]
@@ -50,19 +36,6 @@ Lengths are millimetres, angles degrees, axes those of the volume,
 with the origin at its centre.
 
 Exit codes: 0 done, 1 failed (verify: something differs), 2 wrong usage.";
-
-#[derive(Args)]
-pub struct Global {
-    /// Device to use: its number or part of its name, as `cao devices` lists them [env: CAO_DEVICE]
-    #[arg(long, global = true, help_heading = "Everywhere")]
-    pub device: Option<String>,
-    /// Run under the Vulkan validation layer and fail if it reports anything [env: CAO_VALIDATION=1]
-    #[arg(long, global = true, help_heading = "Everywhere")]
-    pub validate: bool,
-    /// Print one JSON object instead of text
-    #[arg(long, global = true, help_heading = "Everywhere")]
-    pub json: bool,
-}
 
 #[derive(Subcommand)]
 pub enum Command {
@@ -117,48 +90,6 @@ Examples:
 
 Exit code 1 if ours fails where it claims to hold, or the method that a sweep
 is there to catch does not.";
-
-/// How to read a file that holds nothing but values.
-#[derive(Args)]
-#[command(next_help_heading = "Raw data")]
-pub struct Raw {
-    /// The input is raw values: voxels along x, y, z, x fastest
-    #[arg(long, value_name = "X,Y,Z", value_parser = dims, requires = "kind")]
-    pub dims: Option<[usize; 3]>,
-    /// Type of the values, such as uint8, int16, float32
-    #[arg(long = "type", value_name = "TYPE", requires = "dims")]
-    pub kind: Option<String>,
-    /// Distance of voxel centres in mm [default: 1,1,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<f64>, allow_hyphen_values = true, requires = "dims")]
-    pub spacing: Option<[f64; 3]>,
-    /// Order of a value's bytes: little or big [default: little]
-    #[arg(long, value_name = "ORDER", value_parser = endian, requires = "dims")]
-    pub endian: Option<Endian>,
-}
-
-/// How occlusion is computed.
-#[derive(Args)]
-#[command(next_help_heading = "Occlusion")]
-pub struct Settings {
-    /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
-    #[arg(long, value_name = "FILE|PRESET")]
-    pub transfer: Option<String>,
-    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26]
-    #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
-    pub rays: Option<RaySet>,
-    /// Rule along a ray: left (the paper's sum), cell, segment [default: left]
-    #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
-    pub quadrature: Option<Quadrature>,
-    /// Length of the rays in mm [default: 20 times the smallest spacing]
-    #[arg(long, value_name = "R", value_parser = length, allow_hyphen_values = true)]
-    pub radius_mm: Option<f32>,
-    /// Distance from the voxel's centre in mm at which they start [default: half a step]
-    #[arg(long, value_name = "O", value_parser = length, allow_hyphen_values = true)]
-    pub offset_mm: Option<f32>,
-    /// Distance in mm between their samples [default: the smallest spacing]
-    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
-    pub step_mm: Option<f32>,
-}
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
 #[derive(Args)]
@@ -294,46 +225,6 @@ pub struct Info {
     pub raw: Raw,
 }
 
-impl Raw {
-    /// What the user means by the name of a volume.
-    pub fn source(&self, input: &str) -> Result<VolumeSource> {
-        let source = VolumeSource::parse(input);
-        match (self.dims, &self.kind, source) {
-            (Some(dims), Some(kind), VolumeSource::File(path)) => Ok(VolumeSource::Raw {
-                path,
-                dims,
-                kind: kind.clone(),
-                spacing_mm: self.spacing.unwrap_or([1.0; 3]),
-                big_endian: self.endian == Some(Endian::Big),
-            }),
-            (Some(_), ..) => Err(usage(format!("--dims: {input} has dimensions of its own"))),
-            (None, _, source) => Ok(source),
-        }
-    }
-
-    /// Opens a volume by the name that the user gave.
-    pub fn open(&self, input: &str) -> Result<Volume> {
-        open(&self.source(input)?, input)
-    }
-}
-
-/// Opens a volume; errors name `input`, also where the library knows of no file.
-pub fn open(source: &VolumeSource, input: &str) -> Result<Volume> {
-    match source.open() {
-        Err(error @ cao::Error::Config { .. }) => Err(error).with_context(|| input.to_owned()),
-        other => Ok(other?),
-    }
-}
-
-/// An analytic shape or a mesh file.
-pub fn shape(name: &str) -> Result<Shape> {
-    if name.to_lowercase().ends_with(".obj") {
-        let mesh = TriangleMesh::load_obj(Path::new(name))?.outward()?;
-        return Ok(Shape::Mesh(Arc::new(mesh)));
-    }
-    Shape::parse(name).map_err(|error| usage(error.to_string()))
-}
-
 /// The clips in the order given: each --clip-* belongs to the last --clip before it.
 pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
     let places = |id: &str| matches.indices_of(id).into_iter().flatten().collect::<Vec<_>>();
@@ -386,23 +277,6 @@ fn values<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, flag: &str) ->
     matches.get_many::<T>(flag).into_iter().flatten().cloned().collect()
 }
 
-fn three<T: FromStr>(text: &str, separators: &[char]) -> Option<[T; 3]> {
-    let parts: Option<Vec<T>> = text.split(separators).map(|part| part.trim().parse().ok()).collect();
-    parts?.try_into().ok()
-}
-
-fn triple<T: FromStr>(text: &str) -> Result<[T; 3], String> {
-    three(text, &[',']).ok_or_else(|| "expected three numbers, X,Y,Z".into())
-}
-
-fn dims(text: &str) -> Result<[usize; 3], String> {
-    three(text, &[',', 'x']).ok_or_else(|| "expected three whole numbers, X,Y,Z".into())
-}
-
-fn endian(text: &str) -> Result<Endian, String> {
-    Endian::parse(text).ok_or_else(|| "expected little or big".into())
-}
-
 /// Refuses what no pose can have.
 fn posed(value: [f32; 3], set: impl Fn(&mut Pose, Vec3)) -> Result<[f32; 3], String> {
     let mut pose = Pose::default();
@@ -426,19 +300,6 @@ fn scale(text: &str) -> Result<[f32; 3], String> {
     posed(factors, |pose, factors| pose.scale = factors)
 }
 
-fn number(text: &str, expected: impl Display, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
-    let number = text.parse().ok().filter(|n: &f32| n.is_finite() && fits(*n));
-    number.ok_or_else(|| format!("expected {expected}"))
-}
-
-fn length(text: &str) -> Result<f32, String> {
-    number(text, "a length >= 0 mm", |mm| mm >= 0.0)
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    number(text, "a length > 0 mm", |mm| mm > 0.0)
-}
-
 /// A head nearer to the volume's centre than this has no direction to look in.
 fn distance(text: &str) -> Result<f32, String> {
     number(text, "a length > 0 mm, at least 0.001", |mm| mm >= 1e-3)
@@ -456,13 +317,5 @@ fn pair(text: &str) -> Result<[PathBuf; 2], String> {
     match text.split_once(',') {
         Some((left, right)) if !left.is_empty() && !right.is_empty() => Ok([left.into(), right.into()]),
         _ => Err("expected two files, LEFT,RIGHT".into()),
-    }
-}
-
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let limit = 1..=cao::scene::MAX_IMAGE;
-    match text.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
-        Some((Ok(w), Ok(h))) if limit.contains(&w) && limit.contains(&h) => Ok([w, h]),
-        _ => Err(format!("expected WIDTHxHEIGHT, each 1 … {}", cao::scene::MAX_IMAGE)),
     }
 }

@@ -1,19 +1,18 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+#[path = "../common/mod.rs"]
+mod common;
 mod devices;
 mod info;
 mod occlusion;
-mod output;
 mod render;
 mod stability;
 mod verify;
 
 use clap::{CommandFactory, FromArgMatches};
+use common::output;
 use std::process::ExitCode;
-
-/// Exit code for a wrong command line, as clap's own.
-const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let matches = args::Cli::command().get_matches();
@@ -31,14 +30,5 @@ fn main() -> ExitCode {
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };
-    match outcome {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("cao: {error:#}");
-            match error.is::<args::Usage>() {
-                true => ExitCode::from(USAGE),
-                false => ExitCode::FAILURE,
-            }
-        }
-    }
+    common::end("cao", outcome)
 }

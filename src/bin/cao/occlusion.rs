@@ -1,13 +1,12 @@
 //! `cao occlusion`: the ambient volume of a volume, as a file.
 
-use crate::args::{self, Global, Occlusion};
+use crate::args::{self, Global, Occlusion, setup};
 use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
-use cao::renderer::{COLOUR, Renderer, Setup};
+use cao::renderer::{COLOUR, Renderer};
 use cao::scene::Method;
-use cao::stage::lao::Scope;
 use cao::transfer::TransferFunction;
-use cao::volume::{Volume, write_nrrd};
+use cao::volume::write_nrrd;
 use clap::ArgMatches;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -59,19 +58,4 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The settings that the flags ask for; the paper's where they say nothing.
-pub fn setup(settings: &args::Settings, volume: &Volume, method: Method, all: bool) -> Result<Setup> {
-    let mut setup = Setup::paper(volume.min_spacing());
-    setup.method = method;
-    setup.scope = if all { Scope::All } else { Scope::Needed };
-    let occlusion = &mut setup.occlusion;
-    occlusion.rays = settings.rays.unwrap_or(occlusion.rays);
-    occlusion.quadrature = settings.quadrature.unwrap_or(occlusion.quadrature);
-    occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
-    occlusion.offset_mm = settings.offset_mm;
-    occlusion.step_mm = settings.step_mm;
-    occlusion.check(volume.min_spacing())?;
-    Ok(setup)
 }

@@ -1,7 +1,6 @@
 //! `cao verify`: the two claims, checked on the user's device and volume.
 
-use crate::args::{self, Global, Verify};
-use crate::occlusion::setup;
+use crate::args::{self, Global, Verify, setup};
 use crate::output::{Out, Progress, check_validation, open_gpu};
 use anyhow::Result;
 use cao::clip::Shape;

@@ -1,6 +1,6 @@
 //! What the program prints: text for people, one JSON object for machines, progress on a terminal only.
 
-use crate::args::{Global, usage};
+use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
 use cao::gpu::{Gpu, OpenOptions};
 use cao::renderer::{Categories, Setup};
