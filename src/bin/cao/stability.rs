@@ -3,10 +3,9 @@
 use crate::args::{Global, Stability, usage};
 use crate::output::{Out, Progress, check_validation, open_gpu};
 use anyhow::{Context, Result};
-use cao::measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep};
+use cao::measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep, page};
 use cao::volume::write_atomic;
 use serde_json::json;
-use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -26,7 +25,8 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
         false => args.only.clone(),
     };
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
 
     let mut progress = Progress::new();
     progress.stage("preparing");
@@ -41,6 +41,17 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     }
     drop(progress);
     check_validation(&gpu)?;
+    let info = gpu.info();
+    let head = format!(
+        "cao {}, cao stability{}, on {} ({})",
+        env!("CARGO_PKG_VERSION"),
+        if args.quick { " --quick" } else { "" },
+        info.name,
+        info.driver
+    );
+    let html = page::html(&head, &findings);
+    let index = folder.join("index.html");
+    write_atomic(&index, |file| file.write_all(html.as_bytes()))?;
     for (sweep, finding) in &findings {
         out.line(format!("{:<10} {:<8} {}", sweep.name, finding.ours.name(), finding.sentence));
         if !finding.control_fails {
@@ -60,30 +71,18 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
             "setting": f.setting,
         })).collect::<Vec<_>>(),
     }));
-    out.wrote(folder);
+    out.wrote(&index);
     out.finish()?;
     Ok(if all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn write(folder: &Path, sweep: Sweep, finding: &Finding) -> Result<()> {
-    let csv = csv(finding);
-    write_atomic(&folder.join(format!("{}.csv", sweep.name)), |file| file.write_all(csv.as_bytes()))?;
-    Ok(())
-}
-
-/// One row for each point.
-fn csv(finding: &Finding) -> String {
-    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
-    let mut rows = String::from("chart,series,x,y,x_axis,y_axis\n");
-    for panel in &finding.panels {
-        for series in &panel.series {
-            for [x, y] in &series.points {
-                let names = [&panel.title, &series.name].map(|name| quoted(name)).join(",");
-                let axes = [&panel.x.label, &panel.y.label].map(|name| quoted(name)).join(",");
-                // Writing to a String cannot fail.
-                let _ = writeln!(rows, "{names},{x},{y},{axes}");
-            }
-        }
+    let put = |name: String, bytes: &[u8]| write_atomic(&folder.join(name), |file| file.write_all(bytes));
+    put(format!("{}.csv", sweep.name), page::csv(finding).as_bytes())?;
+    for (n, chart) in finding.charts.iter().enumerate() {
+        let drawing = page::draw(chart, &finding.setting);
+        put(format!("{}-{}.svg", sweep.name, n + 1), drawing.svg().as_bytes())?;
+        put(format!("{}-{}.png", sweep.name, n + 1), &drawing.png()?)?;
     }
-    rows
+    Ok(())
 }

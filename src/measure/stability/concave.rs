@@ -3,12 +3,13 @@
 //! Control: P pairs are peeled and the rest is left out without a word, as a fixed number of layers does; the paper's is one,
 //! for convex meshes. Ours counts what is missing and refuses.
 
-use super::{Axis, Effort, Finding, Ours, Panel, Series, evenly, short};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly};
 use crate::Result;
 use crate::clip::ClipCamera;
 use crate::cpu::clips::MeshLayers;
 use crate::cpu::peel::peel;
 use crate::gpu::Gpu;
+use crate::measure::plot::short;
 use crate::mesh::TriangleMesh;
 use crate::stage::peel::{MAX_PAIRS, Peel};
 use glam::Vec3;
@@ -71,7 +72,11 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         .filter(|(series, _)| series.points[0][1] > 0.0)
         .map(|(series, (name, _, needed))| {
             let right = series.points.iter().find(|point| point[1] == 0.0).map_or(0.0, |point| point[0]);
-            format!("{} % of the {name} (right from P = {}, needs {needed})", short(series.points[0][1]), short(right))
+            format!(
+                "{} % of the {name} (right from P = {}, needs {needed})",
+                short(series.points[0][1]),
+                short(right)
+            )
         })
         .collect();
     let ours: Vec<[f64; 2]> =
@@ -99,10 +104,10 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             "depth layers of {0}² pixels, cut tested at {1}³ points of the mesh's bounds",
             plan.resolution, plan.points
         ),
-        panels: vec![Panel {
+        charts: vec![Chart {
             title: "Volume cut wrongly when layers are missing".into(),
-            x: Axis::linear("P, layer pairs allowed"),
-            y: Axis::linear("wrong, % of the shape's volume"),
+            x: Quantity::linear("P, layer pairs allowed"),
+            y: Quantity::linear("wrong, % of the shape's volume"),
             series,
         }],
     })

@@ -5,15 +5,16 @@
 //! the twins: V_AO of the clipped volume, fully computed, against V_PAO. Control: the published recipe, with 32-bit depths
 //! and with the half floats of its authors' program. Maps are evaluated where a voxel changed, which is all that counts, so that the largest take seconds.
 
-use super::{Axis, Effort, Finding, Ours, Panel, Series, short};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
 use crate::clip::{Clip, ClipCamera, Mode, Pose, Shape};
-use crate::cpu::clips::MeshLayers;
 use crate::cpu::classify::sample_positions;
+use crate::cpu::clips::MeshLayers;
 use crate::cpu::dilate::{Cells, changed_radius};
 use crate::cpu::lao::lao_at;
 use crate::cpu::{Grid, each};
 use crate::gpu::Gpu;
+use crate::measure::plot::short;
 use crate::mesh::TriangleMesh;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
 use crate::renderer::{COLOUR, Renderer, Setup};
@@ -75,8 +76,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     for (n, &resolution) in plan.resolutions.iter().enumerate() {
         let mut sum = [0_usize; 4];
         for (c, clip) in clips.iter().enumerate() {
-            let maps =
-                MapSettings { resolution, cells: DEVICE_CELLS, ..MapSettings::default() };
+            let maps = MapSettings { resolution, cells: DEVICE_CELLS, ..MapSettings::default() };
             renderer.set_setup(Setup { maps, ..setup })?;
             renderer.set_clips(std::slice::from_ref(clip))?;
             renderer.update(&mut |_| ())?;
@@ -124,10 +124,10 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             "engine {}³, 26 rays, radius {RADIUS} voxels; sphere and torus meshes at {} poses each; sums over all clips",
             plan.edge, plan.poses
         ),
-        panels: vec![Panel {
+        charts: vec![Chart {
             title: "Voxels that a contextual update leaves stale".into(),
-            x: Axis::log("pixels along an edge of the dilation map"),
-            y: Axis::linear("stale voxels"),
+            x: Quantity::log("pixels along an edge of the dilation map"),
+            y: Quantity::linear("stale voxels"),
             series: vec![half, single, ours, device],
         }],
     })
@@ -172,8 +172,17 @@ struct Count {
 
 impl Scene {
     /// Recipes of one kind, which share the camera and with it the cut.
-    fn stale(&self, gpu: &Gpu, peel: &Peel, clip: &Clip, resolution: u32, recipes: &[Recipe]) -> Result<Count> {
-        let Shape::Mesh(mesh) = &clip.shape else { return Ok(Count { changed: 0, stale: vec![0; recipes.len()] }) };
+    fn stale(
+        &self,
+        gpu: &Gpu,
+        peel: &Peel,
+        clip: &Clip,
+        resolution: u32,
+        recipes: &[Recipe],
+    ) -> Result<Count> {
+        let Shape::Mesh(mesh) = &clip.shape else {
+            return Ok(Count { changed: 0, stale: vec![0; recipes.len()] });
+        };
         let grid = &self.grid;
         let literal = !recipes.contains(&Recipe::Conservative);
         let reach = self.occlusion.reach(grid.min_spacing());

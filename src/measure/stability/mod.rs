@@ -8,6 +8,7 @@
 pub mod concave;
 pub mod dilation;
 pub mod motion;
+pub mod page;
 pub mod radius;
 pub mod stereo;
 
@@ -68,16 +69,16 @@ impl Series {
     }
 }
 
-/// An axis of a chart.
+/// What an axis of a chart shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Axis {
+pub struct Quantity {
     /// What and in which unit.
     pub label: String,
     /// Equal factors have equal lengths.
     pub log: bool,
 }
 
-impl Axis {
+impl Quantity {
     /// Equal differences have equal lengths.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false }
@@ -91,13 +92,13 @@ impl Axis {
 
 /// Curves over one parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
+pub struct Chart {
     /// What is asked.
     pub title: String,
     /// The parameter.
-    pub x: Axis,
+    pub x: Quantity,
     /// What is measured.
-    pub y: Axis,
+    pub y: Quantity,
     /// The curves.
     pub series: Vec<Series>,
 }
@@ -133,7 +134,7 @@ impl Ours {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// The curves.
-    pub panels: Vec<Panel>,
+    pub charts: Vec<Chart>,
     /// What failed and at which value.
     pub sentence: String,
     /// Whether ours did.
@@ -189,10 +190,7 @@ impl Sweep {
     pub fn parse(name: &str) -> Result<Self> {
         SWEEPS.into_iter().find(|sweep| sweep.name == name).ok_or_else(|| crate::Error::Config {
             what: "sweep".into(),
-            problem: format!(
-                "\"{name}\" is none; there are {}",
-                SWEEPS.map(|sweep| sweep.name).join(", ")
-            ),
+            problem: format!("\"{name}\" is none; there are {}", SWEEPS.map(|sweep| sweep.name).join(", ")),
         })
     }
 }
@@ -227,32 +225,9 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get(place).copied().unwrap_or(0.0)
 }
 
-/// A number as a sentence has it: three digits.
-fn short(value: f64) -> String {
-    let size = value.abs();
-    match value {
-        0.0 => "0".into(),
-        _ if !(1e-3..1e5).contains(&size) => format!("{value:.1e}"),
-        _ => {
-            let digits = (2 - size.log10().floor() as i32).clamp(0, 5) as usize;
-            let text = format!("{value:.digits$}");
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').into(),
-                false => text,
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_of_a_sentence_have_three_digits() {
-        let found = [0.0, 0.01234, 1.5, 63.0, 0.9999, 1234.5, 2.3e-7, -0.25, 5e6].map(short);
-        assert_eq!(found, ["0", "0.0123", "1.5", "63", "1", "1234", "2.3e-7", "-0.25", "5.0e6"]);
-    }
 
     #[test]
     fn quantiles_and_means_are_of_the_values() {

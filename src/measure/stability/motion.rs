@@ -5,11 +5,12 @@
 //! coarser ones are frames left out. Control of the jumps: N = 0, no anti-aliasing samples (CAO eq. (5)). Control of settling:
 //! progressive LAO, which recomputes one part of the slices a frame and shows the rest as it was.
 
-use super::{Axis, Effort, Finding, Ours, Panel, Series, mean, short};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
 use crate::Result;
 use crate::clip::{Clip, Pose, Shape};
 use crate::cpu::{Grid, trilinear, trilinear_clamped};
 use crate::gpu::Gpu;
+use crate::measure::plot::short;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
 use crate::renderer::{COLOUR, Renderer, Setup};
 use crate::stage::classify::AntiAliasing;
@@ -87,8 +88,13 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     let ratio = ambient[0].at(finest) / ambient[2].at(finest).max(1e-12);
     let holds = settling.ours_frames == 0 && settling.different == 0;
     let says = match holds {
-        true => format!("ours has settled in the very frame, bit for bit, while progressive LAO takes {} more", settling.progressive_frames),
-        false => format!("OURS takes {} more frames, {} voxels differ", settling.ours_frames, settling.different),
+        true => format!(
+            "ours has settled in the very frame, bit for bit, while progressive LAO takes {} more",
+            settling.progressive_frames
+        ),
+        false => {
+            format!("OURS takes {} more frames, {} voxels differ", settling.ours_frames, settling.different)
+        }
     };
     Ok(Finding {
         sentence: format!(
@@ -108,23 +114,23 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
              frames that far apart, mean over the cut face's points or pixels; progressive: one slice in {PARTS} a frame",
             plan.edge, plan.pixels
         ),
-        panels: vec![
-            Panel {
+        charts: vec![
+            Chart {
                 title: "Jump of the ambient factor on the cut face from frame to frame".into(),
-                x: Axis::log("step of the clip, voxels a frame"),
-                y: Axis::log("largest jump, mean |Δ| over the face (0 … 1)"),
+                x: Quantity::log("step of the clip, voxels a frame"),
+                y: Quantity::log("largest jump, mean |Δ| over the face (0 … 1)"),
                 series: ambient,
             },
-            Panel {
+            Chart {
                 title: "Jump of the picture of the cut face from frame to frame".into(),
-                x: Axis::log("step of the clip, voxels a frame"),
-                y: Axis::log("largest jump, mean |Δ| of linear light (0 … 1)"),
+                x: Quantity::log("step of the clip, voxels a frame"),
+                y: Quantity::log("largest jump, mean |Δ| of linear light (0 … 1)"),
                 series: picture,
             },
-            Panel {
+            Chart {
                 title: format!("Error of the shown ambient volume; the clip stops after frame {}", MOVES - 1),
-                x: Axis::linear("frame"),
-                y: Axis::linear("largest |error| of a visible voxel (0 … 1)"),
+                x: Quantity::linear("frame"),
+                y: Quantity::linear("largest |error| of a visible voxel (0 … 1)"),
                 series: settling.series,
             },
         ],
@@ -268,7 +274,8 @@ fn settle(stage: &mut Stage, tick: &mut dyn FnMut()) -> Result<Settling> {
                 *value = truth[i];
             }
         }
-        let off = |i: usize| if mask[i] > 0 && stage.full[i] > 0.0 { (shown[i] - truth[i]).abs() } else { 0.0 };
+        let off =
+            |i: usize| if mask[i] > 0 && stage.full[i] > 0.0 { (shown[i] - truth[i]).abs() } else { 0.0 };
         let worst = (0..truth.len()).map(off).fold(0.0, f32::max);
         progressive.push([frame as f64, f64::from(worst)]);
         // After the last move nothing of ours may change any more.

@@ -4,10 +4,11 @@
 //! buries the inner ones, whose rays all end in a shell. Feature-driven ambient occlusion (fdAO) is the answer to this; it does not exist here
 //! yet, so the sweep shows where ours, being LAO, stops being of use.
 
-use super::{Axis, Effort, Finding, Ours, Panel, Series, short};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
 use crate::cpu::lao::lao_at;
 use crate::cpu::{Grid, each};
+use crate::measure::plot::short;
 use crate::measure::random::Random;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
 use crate::volume::builtin::builtin_box;
@@ -94,7 +95,9 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let ends = [inner.points[0], *inner.points.last().unwrap_or(&[0.0; 2])];
     let buried = inner.points.iter().find(|point| point[1] < BURIED);
     let from = match buried {
-        Some([radius, _]) => format!("below {BURIED}, too dark to tell from black, from {} voxels on", short(*radius)),
+        Some([radius, _]) => {
+            format!("below {BURIED}, too dark to tell from black, from {} voxels on", short(*radius))
+        }
         None => format!("above {BURIED} throughout"),
     };
     Ok(Finding {
@@ -113,10 +116,10 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             "fruit {}³, every layer of opacity {OPACITY} a voxel, 26 rays, segment rule, {} voxels of each layer",
             plan.edge, plan.voxels
         ),
-        panels: vec![Panel {
+        charts: vec![Chart {
             title: "Ambient factor of nested layers".into(),
-            x: Axis::log("radius, voxels"),
-            y: Axis::log("mean ambient factor of the layer (0 … 1)"),
+            x: Quantity::log("radius, voxels"),
+            y: Quantity::log("mean ambient factor of the layer (0 … 1)"),
             series,
         }],
     })

@@ -4,11 +4,12 @@
 //! Points are what the left eye's picture shows and the right eye sees too. Control: occlusion from each eye's depth image
 //! ([`crate::cpu::ssao`]), with the same radius.
 
-use super::{Axis, Effort, Finding, Ours, Panel, Series, evenly, mean, quantile, short};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly, mean, quantile};
 use crate::Result;
 use crate::clip::{Clip, Pose, Shape};
 use crate::cpu::ssao::{Settings, ssao};
 use crate::gpu::Gpu;
+use crate::measure::plot::short;
 use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
 use crate::stage::eyes::Look;
 use crate::transfer::TransferFunction;
@@ -107,7 +108,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         ),
         count => format!("OURS DIFFERS at {count} of {points} points"),
     };
-    let eyes = || Axis::linear("distance between the eyes, mm");
+    let eyes = || Quantity::linear("distance between the eyes, mm");
     Ok(Finding {
         sentence: format!("{failing}; {ours}."),
         ours: Ours::holding(points > 0 && grid_different == 0),
@@ -119,21 +120,21 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             short(SIZE_MM),
             plan.pixels
         ),
-        panels: vec![
-            Panel {
+        charts: vec![
+            Chart {
                 title: "Difference of the ambient factor at points that both eyes see".into(),
                 x: eyes(),
-                y: Axis::linear("|left − right| of the ambient factor (0 … 1)"),
+                y: Quantity::linear("|left − right| of the ambient factor (0 … 1)"),
                 series: vec![
                     image_high,
                     image_mean,
                     Series::ours("data space (ours), largest", grid_largest),
                 ],
             },
-            Panel {
+            Chart {
                 title: "Points at which the eyes differ at all".into(),
                 x: eyes(),
-                y: Axis::linear("share of the points both see, %"),
+                y: Quantity::linear("share of the points both see, %"),
                 series: vec![
                     Series::control("image space", image_share),
                     any_share,
@@ -161,11 +162,8 @@ struct Differences {
 fn compare(renderer: &Renderer, volume: &Volume, plan: &Plan, separation_mm: f32) -> Result<Differences> {
     let voxel = volume.min_spacing() as f32;
     let framing = StereoRig::framing(volume.size_mm(), 30.0, 25.0);
-    let rig = StereoRig {
-        position: framing.position.normalize() * DISTANCE_MM,
-        ipd_mm: separation_mm,
-        ..framing
-    };
+    let rig =
+        StereoRig { position: framing.position.normalize() * DISTANCE_MM, ipd_mm: separation_mm, ..framing };
     let views = rig.views(1.0, 50.0, 1500.0)?;
     let look = Look { jitter: false, ..Look::default() };
     let (picture, _) = renderer.draw(&views, &look, [plan.pixels; 2])?;
