@@ -6,9 +6,11 @@
 //! carries its own control: a method that is known to fail there.
 
 pub mod concave;
+pub mod cut;
 pub mod dilation;
 pub mod motion;
 pub mod page;
+mod plane_cut;
 pub mod radius;
 pub mod stereo;
 
@@ -157,7 +159,7 @@ pub struct Sweep {
 }
 
 /// Every sweep, in the order of measure.md §4.
-pub const SWEEPS: [Sweep; 5] = [
+pub const SWEEPS: [Sweep; 6] = [
     Sweep {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -177,6 +179,11 @@ pub const SWEEPS: [Sweep; 5] = [
         name: "concave",
         title: "What is cut wrongly when a concave clip has too few depth layers?",
         run: |gpu, effort, progress| concave::run(gpu, &concave::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "cut",
+        title: "How wrong is the shading of a cut face?",
+        run: |gpu, effort, progress| cut::run(gpu, &cut::Plan::of(effort), progress),
     },
     Sweep {
         name: "radius",

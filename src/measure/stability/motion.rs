@@ -5,19 +5,16 @@
 //! coarser ones are frames left out. Control of the jumps: N = 0, no anti-aliasing samples (CAO eq. (5)). Control of settling:
 //! progressive LAO, which recomputes one part of the slices a frame and shows the rest as it was.
 
+use super::plane_cut::PlaneCut;
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
 use crate::Result;
-use crate::clip::{Clip, Pose, Shape};
-use crate::cpu::{Grid, trilinear, trilinear_clamped};
+use crate::cpu::trilinear_clamped;
 use crate::gpu::Gpu;
 use crate::measure::plot::short;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::{COLOUR, Renderer, Setup};
+use crate::renderer::Setup;
 use crate::stage::classify::AntiAliasing;
 use crate::stage::eyes::Look;
-use crate::transfer::TransferFunction;
-use crate::view::StereoRig;
-use crate::volume::builtin::builtin_box;
 use glam::Vec3;
 
 /// Sizes and values of the sweep.
@@ -65,16 +62,26 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         done += 1.0;
         progress(done / total);
     };
+    let occlusion = Occlusion {
+        rays: RaySet::R14,
+        quadrature: Quadrature::Left,
+        radius_mm: RADIUS,
+        offset_mm: None,
+        step_mm: None,
+    };
     let (mut ambient, mut picture) = (Vec::new(), Vec::new());
-    let mut stage = Stage::new(gpu, plan)?;
+    let mut stage = PlaneCut::new(gpu, plan.edge, occlusion, plan.way)?;
     for (samples, name) in [(AntiAliasing::N0, 0), (AntiAliasing::N8, 8), (AntiAliasing::N32, 32)] {
-        stage.samples(samples)?;
-        let mut shown = Vec::new();
+        {
+            let setup = Setup { anti_aliasing: samples, ..*stage.renderer.setup() };
+            stage.renderer.set_setup(setup)?;
+        };
+        let mut seen = Vec::new();
         for frame in 0..frames {
-            shown.push(stage.frame(frame as f64 / plan.frames as f64, plan.pixels)?);
+            seen.push(shown(&mut stage, frame as f64 / plan.frames as f64, plan.pixels)?);
             tick();
         }
-        let curve = |of: fn(&Frame) -> &Vec<f64>| jumps(&shown, plan.frames, of);
+        let curve = |of: fn(&Frame) -> &Vec<f64>| jumps(&seen, plan.frames, of);
         let series = |points| match name {
             0 => Series::control("N = 0", points),
             n => Series::ours(format!("N = {n}{}", if n == 32 { " (ours)" } else { "" }), points),
@@ -98,14 +105,15 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     };
     Ok(Finding {
         sentence: format!(
-            "Without anti-aliasing samples the cut face's ambient factor jumps by {} in a step of {} voxel ({} of the picture's light), \
-             {}× as much as with N = 32 ({}; N = 8: {}); when the clip stops, {says}.",
+            "Without anti-aliasing samples the cut face's ambient factor jumps by {} in a step of {} voxel (the picture's light by {}), \
+             {}× as much as with N = 32 ({}; N = 8: {}), though over a whole voxel it changes by {} only; when the clip stops, {says}.",
             short(ambient[0].at(finest)),
             short(finest),
             short(picture[0].at(finest)),
             short(ratio),
             short(ambient[2].at(finest)),
             short(ambient[1].at(finest)),
+            short(ambient[2].at(1.0)),
         ),
         ours: Ours::holding(holds && ambient[2].at(finest) < ambient[0].at(finest)),
         control_fails: ratio > 1.0 && settling.progressive_frames > 0,
@@ -161,87 +169,24 @@ fn jumps(frames: &[Frame], per_voxel: usize, of: fn(&Frame) -> &Vec<f64>) -> Vec
     points
 }
 
-/// A volume cut by a plane that faces +x.
-struct Stage {
-    renderer: Renderer,
-    grid: Grid,
-    full: Vec<f32>,
-    /// Points (y, z) of the face inside the object, index coordinates.
-    face: Vec<[f64; 2]>,
-    /// Index coordinate x at which the way begins.
-    start: f64,
-}
-
-impl Stage {
-    fn new(gpu: &Gpu, plan: &Plan) -> Result<Self> {
-        let volume = builtin_box("engine", [plan.edge; 3], [1.0; 3])?;
-        let grid = Grid { dims: volume.dims, spacing: volume.spacing };
-        let occlusion = Occlusion {
-            rays: RaySet::R14,
-            quadrature: Quadrature::Left,
-            radius_mm: RADIUS,
-            offset_mm: None,
-            step_mm: None,
-        };
-        let setup = Setup { occlusion, ..Setup::paper(1.0) };
-        let transfer = TransferFunction::preset("auto", volume.range())?;
-        let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;
-        renderer.update(&mut |_| ())?;
-        let full = renderer.read_opacity()?;
-        let start = (0.55 * plan.edge as f64).floor();
-        // In the object over the whole way, and a voxel from its edges.
-        let inside = |at: [f64; 3]| trilinear(&grid, &full, at) > 0.3;
-        let face = (0..4 * plan.edge * plan.edge)
-            .map(|i| [i % (2 * plan.edge), i / (2 * plan.edge)].map(|c| c as f64 / 2.0))
-            .filter(|&[y, z]| {
-                [-1.0, 0.0, 1.0].iter().all(|&d| {
-                    (0..=plan.way).all(|w| {
-                        let x = start + w as f64;
-                        inside([x, y + d, z]) && inside([x, y, z + d])
-                    })
-                })
-            })
-            .collect();
-        Ok(Self { renderer, grid, full, face, start })
-    }
-
-    fn samples(&mut self, samples: AntiAliasing) -> Result<()> {
-        let setup = Setup { anti_aliasing: samples, ..*self.renderer.setup() };
-        self.renderer.set_setup(setup)
-    }
-
-    /// Puts the face `way` voxels behind its start, and brings the ambient volume up to date.
-    fn place(&mut self, way: f64) -> Result<f64> {
-        let x = self.start - way;
-        let world = self.grid.to_world([x, 0.0, 0.0])[0];
-        let pose = Pose {
-            translate_mm: Vec3::new(world as f32, 0.0, 0.0),
-            rotate_deg: Vec3::new(0.0, 90.0, 0.0),
-            ..Pose::default()
-        };
-        self.renderer.set_clips(&[Clip { pose, ..Clip::remove(Shape::Plane) }])?;
-        self.renderer.update(&mut |_| ())?;
-        Ok(x)
-    }
-
-    fn frame(&mut self, way: f64, pixels: u32) -> Result<Frame> {
-        let x = self.place(way)?;
-        let ambient = self.renderer.read_ambient()?;
-        let at_face = |&[y, z]: &[f64; 2]| trilinear_clamped(&self.grid, &ambient, [x, y, z]);
-        // From the side that the plane took away, straight at the face.
-        let size = self.grid.dims.map(|d| d as f64);
-        let rig = StereoRig { ipd_mm: 0.0, ..StereoRig::framing(size, 90.0, 0.0) };
-        let views = rig.views(1.0, 1.0, 20.0 * size[0] as f32)?;
-        let look = Look { jitter: false, ..Look::default() };
-        let (picture, _) = self.renderer.draw(&views, &look, [pixels; 2])?;
-        let light = self.face.iter().filter_map(|&[y, z]| {
-            let world = self.grid.to_world([x, y, z]).map(|c| c as f32);
-            let (uv, _) = views[0].project(Vec3::from_array(world))?;
-            let [u, v] = uv.to_array().map(|c| ((c * pixels as f32) as usize).min(pixels as usize - 1));
-            Some(f64::from(picture.colour[0][v * pixels as usize + u][1]))
-        });
-        Ok(Frame { ambient: self.face.iter().map(at_face).collect(), light: light.collect() })
-    }
+/// Moves the face `way` voxels from its start and looks at it.
+fn shown(cut: &mut PlaneCut, way: f64, pixels: u32) -> Result<Frame> {
+    let x = cut.place(way)?;
+    let ambient = cut.renderer.read_ambient()?;
+    let at_face = |&[y, z]: &[f64; 2]| trilinear_clamped(&cut.grid, &ambient, [x, y, z]);
+    let views = cut.views()?;
+    let look = Look { jitter: false, ..Look::default() };
+    let (picture, _) = cut.renderer.draw(&views, &look, [pixels; 2])?;
+    let light = |&[y, z]: &[f64; 2]| {
+        let world = cut.grid.to_world([x, y, z]).map(|c| c as f32);
+        let (uv, _) = views[0].project(Vec3::from_array(world))?;
+        let [u, v] = uv.to_array().map(|c| ((c * pixels as f32) as usize).min(pixels as usize - 1));
+        Some(f64::from(picture.colour[0][v * pixels as usize + u][1]))
+    };
+    Ok(Frame {
+        ambient: cut.face.iter().map(at_face).collect(),
+        light: cut.face.iter().filter_map(light).collect(),
+    })
 }
 
 /// What happens when the clip stops.
@@ -254,7 +199,7 @@ struct Settling {
     different: u64,
 }
 
-fn settle(stage: &mut Stage, tick: &mut dyn FnMut()) -> Result<Settling> {
+fn settle(stage: &mut PlaneCut, tick: &mut dyn FnMut()) -> Result<Settling> {
     let (mut ours, mut progressive) = (Vec::new(), Vec::new());
     stage.place(0.0)?;
     let mut shown = stage.renderer.read_ambient()?;
@@ -282,7 +227,8 @@ fn settle(stage: &mut Stage, tick: &mut dyn FnMut()) -> Result<Settling> {
         let late = frame >= MOVES && before != truth;
         if frame + 1 >= MOVES {
             let rest = frame + 2 - MOVES;
-            settled[0] = if late || difference.different > 0 { rest } else { settled[0] };
+            let unsettled = late || difference.different > 0;
+            settled[0] = if unsettled { rest } else { settled[0] };
             settled[1] = if f64::from(worst) > SETTLED { rest } else { settled[1] };
         }
         tick();
