@@ -5,14 +5,18 @@
 //! failed at which value, made from the numbers alone. A sweep in which nothing fails shows nothing, so that each
 //! carries its own control: a method that is known to fail there.
 
+pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
 pub mod motion;
+pub mod numbers;
 pub mod page;
 mod plane_cut;
 pub mod radius;
+pub mod sheets;
 pub mod stereo;
+pub mod views;
 
 use crate::Result;
 use crate::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
@@ -159,7 +163,7 @@ pub struct Sweep {
 }
 
 /// Every sweep, in the order of measure.md §4.
-pub const SWEEPS: [Sweep; 6] = [
+pub const SWEEPS: [Sweep; 10] = [
     Sweep {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -189,6 +193,26 @@ pub const SWEEPS: [Sweep; 6] = [
         name: "radius",
         title: "How dark do inner layers become as the radius grows?",
         run: |_, effort, progress| radius::run(&radius::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "sheets",
+        title: "How much occlusion of thin sheets do directions and steps miss?",
+        run: |_, effort, progress| sheets::run(&sheets::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "anisotropy",
+        title: "Does the shading depend on which way a scene lies on anisotropic voxels?",
+        run: |_, effort, progress| anisotropy::run(&anisotropy::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "numbers",
+        title: "Do extreme and impossible numbers give a defined result or a clear error?",
+        run: |gpu, effort, progress| numbers::run(gpu, &numbers::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "views",
+        title: "Do odd eyes see holes, or each another picture?",
+        run: |gpu, effort, progress| views::run(gpu, &views::Plan::of(effort), progress),
     },
 ];
 
