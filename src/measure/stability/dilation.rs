@@ -191,7 +191,8 @@ impl Scene {
             true => (reach, reach),
             false => {
                 let radius = changed_radius(grid, reach);
-                let half = 0.5 * (grid.len() as f32).cbrt() * 3.0_f32.sqrt();
+                let size = std::array::from_fn(|axis| grid.dims[axis] as f64 * grid.spacing[axis]);
+                let half = 0.5 * Vec3::from_array(size.map(|c: f64| c as f32)).length();
                 (radius + clip.rounding_mm(half, radius), 0.0)
             }
         };
@@ -199,21 +200,18 @@ impl Scene {
         let layers = MeshLayers::from(&peel.run(gpu, mesh, clip.pose.scale, camera, 4)?);
 
         let positions = sample_positions(32);
-        let samples = |voxel: [usize; 3]| -> Vec<Vec3> {
-            let at = |p: &[f64; 3]| {
-                let index = std::array::from_fn(|axis| voxel[axis] as f64 + 0.5 * p[axis]);
-                Vec3::from_array(grid.to_world(index).map(|c| c as f32))
-            };
-            positions.iter().map(at).map(|world| clip.pose.to_rigid(world)).collect()
+        let to_rigid = clip.pose.rotation().transpose();
+        // The n-th sample of a voxel in the mesh's rigid frame, as `Pose::to_rigid` has it.
+        let sample = |voxel: [usize; 3], n: usize| {
+            let index = std::array::from_fn(|axis| voxel[axis] as f64 + 0.5 * positions[n][axis]);
+            let world = Vec3::from_array(grid.to_world(index).map(|c| c as f32));
+            to_rigid * (world - clip.pose.translate_mm)
         };
-        let seen = |samples: &[Vec3]| samples.iter().filter(|&&p| !layers.inside(p)).count();
+        let seen = |voxel, of: usize| (0..of).filter(|&n| !layers.inside(sample(voxel, n))).count();
         // Stage 4: visible samples of nine, of all where they disagree, and how many were tested.
-        let shares: Vec<(usize, usize)> = each(grid.len(), |i| {
-            let samples = samples(grid.voxel(i));
-            match seen(&samples[..9]) {
-                count @ (0 | 9) => (count, 9),
-                _ => (seen(&samples), samples.len()),
-            }
+        let shares: Vec<(usize, usize)> = each(grid.len(), |i| match seen(grid.voxel(i), 9) {
+            count @ (0 | 9) => (count, 9),
+            _ => (seen(grid.voxel(i), positions.len()), positions.len()),
         });
         let clipped: Vec<f32> = shares
             .iter()
@@ -225,7 +223,7 @@ impl Scene {
         let far = bound + changed_radius(grid, reach);
         let found: Vec<Option<usize>> = each(grid.len(), |i| {
             let voxel = grid.voxel(i);
-            let near = samples(voxel)[0].length() <= far;
+            let near = sample(voxel, 0).length() <= far;
             let needed = clipped[i] > 0.0 || grid.neighbours(voxel).any(|n| clipped[grid.index(n)] > 0.0);
             let visible = shares[i].0 > 0 || grid.neighbours(voxel).any(|n| shares[grid.index(n)].0 > 0);
             let differs = || {
@@ -243,10 +241,9 @@ impl Scene {
             };
             let untouched = each(changed.len(), |n| {
                 let i = changed[n];
-                let samples = samples(grid.voxel(i));
                 // The paper counts samples; the conservative radius covers the voxel around its centre.
-                let tested = if literal { &samples[..shares[i].1] } else { &samples[..1] };
-                !tested.iter().any(|&rigid| cells.dilated(rigid))
+                let tested = if literal { shares[i].1 } else { 1 };
+                !(0..tested).any(|n| cells.dilated(sample(grid.voxel(i), n)))
             });
             stale.push(untouched.into_iter().filter(|&is| is).count());
         }

@@ -11,6 +11,7 @@ use crate::gpu::Gpu;
 use crate::measure::plot::short;
 use crate::occlusion::{Occlusion, Quadrature, RaySet};
 use crate::renderer::{COLOUR, Renderer, Setup};
+use crate::scene::Method;
 use crate::stage::lao::Scope;
 use crate::transfer::TransferFunction;
 use crate::volume::builtin::builtin_box;
@@ -52,6 +53,9 @@ const MIDDLE: usize = 8;
 /// Opacities are f32, products of six of them and their sums too: a device may be off by some of these.
 pub const ROUNDING: f64 = 64.0 * f32::EPSILON as f64;
 
+/// The case whose message is shown.
+const NAN_IN_FILE: &str = "NaN in a file";
+
 /// What became of a case.
 enum Outcome {
     /// All ambient factors are numbers from 0 to 1, and what they should be.
@@ -71,10 +75,11 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         progress(f64::min(done / total, 1.0));
     };
     let mut series = Vec::new();
+    let mut even = Even::new(gpu)?;
     for quadrature in Quadrature::ALL {
         let mut points = Vec::new();
         for &opacity in &plan.opacities {
-            let found = even(gpu, opacity as f32, quadrature)?;
+            let found = even.ambient(opacity as f32, quadrature)?;
             let expected = closed_form(quadrature, 1.0 - f64::from(opacity as f32), f64::from(SAMPLES));
             points.push([opacity, (f64::from(found) - expected).abs()]);
             tick();
@@ -94,10 +99,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         })
         .collect();
     let defined = cases.iter().filter(|(_, outcome)| matches!(outcome, Outcome::Defined)).count();
-    let refused: Vec<&String> = cases
-        .iter()
-        .filter_map(|(_, outcome)| if let Outcome::Refused(message) = outcome { Some(message) } else { None })
-        .collect();
+    let refused = cases.iter().filter(|(_, outcome)| matches!(outcome, Outcome::Refused(_))).count();
 
     let poisoned: Vec<[f64; 2]> = plan
         .radii
@@ -116,12 +118,15 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             "ours gives a defined result in {defined} of {} extreme cases and refuses the other {} with a reason, and meets the closed \
              form for every opacity from 0 to 1 within {}",
             cases.len(),
-            refused.len(),
+            refused,
             short(worst)
         ),
         false => format!("OURS: {}; {} off the closed form", wrong.join("; "), short(worst)),
     };
-    let example = refused.iter().find(|message| message.contains("NaN")).map_or("", |message| message);
+    let message = cases.iter().find_map(|(name, outcome)| match outcome {
+        Outcome::Refused(message) if name == NAN_IN_FILE => Some(message.as_str()),
+        _ => None,
+    });
     Ok(Finding {
         sentence: format!(
             "Computed without a check, one NaN in a file spoils {} voxels at a radius of {} and {} at {}; {says}.",
@@ -133,9 +138,10 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         ours: Ours::holding(holds),
         control_fails: poisoned.points.iter().all(|point| point[1] > 1.0),
         setting: format!(
-            "even volume {0}³, 26 rays of {SAMPLES} samples, its middle voxel on the device; cases: {1}; the message for NaN: \"{example}\"",
+            "even volume {0}³, 26 rays of {SAMPLES} samples, its middle voxel on the device; cases: {1}; {NAN_IN_FILE}: {2}",
             2 * MIDDLE + 1,
-            cases.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+            cases.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", "),
+            message.unwrap_or("taken for a number")
         ),
         charts: vec![
             Chart {
@@ -154,24 +160,45 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     })
 }
 
-/// Ambient factor in the middle of a volume of this opacity everywhere.
-fn even(gpu: &Gpu, opacity: f32, quadrature: Quadrature) -> Result<f32> {
-    let grid = Grid { dims: [2 * MIDDLE + 1; 3], spacing: [1.0; 3] };
-    let volume = Volume::new(grid.dims, grid.spacing, Values::F32(vec![opacity; grid.len()]))?;
-    let ambient = ambient(gpu, &volume, occlusion(quadrature, SAMPLES as f32))?;
-    Ok(ambient[grid.index([MIDDLE; 3])])
+/// A volume of the same value everywhere.
+struct Even {
+    renderer: Renderer,
+    middle: usize,
 }
+
+impl Even {
+    fn new(gpu: &Gpu) -> Result<Self> {
+        let grid = Grid { dims: [2 * MIDDLE + 1; 3], spacing: [1.0; 3] };
+        let volume = Volume::new(grid.dims, grid.spacing, Values::U8(vec![1; grid.len()]))?;
+        let renderer = renderer(gpu, &volume, occlusion(Quadrature::Left, SAMPLES as f32))?;
+        Ok(Self { renderer, middle: grid.index([MIDDLE; 3]) })
+    }
+
+    /// Ambient factor in its middle where all of it has this opacity.
+    fn ambient(&mut self, opacity: f32, quadrature: Quadrature) -> Result<f32> {
+        self.renderer.set_transfer(TransferFunction::new(vec![[0.0, opacity]], WHITE.to_vec(), None)?)?;
+        let ambient = computed(&mut self.renderer, occlusion(quadrature, SAMPLES as f32))?;
+        Ok(ambient[self.middle])
+    }
+}
+
+const WHITE: [[f32; 4]; 1] = [[0.0, 1.0, 1.0, 1.0]];
 
 fn occlusion(quadrature: Quadrature, radius_mm: f32) -> Occlusion {
     Occlusion { rays: RaySet::R26, quadrature, radius_mm, offset_mm: None, step_mm: None }
 }
 
-/// Every voxel's ambient factor where data values are opacities.
-fn ambient(gpu: &Gpu, volume: &Volume, occlusion: Occlusion) -> Result<Vec<f32>> {
-    let transfer = TransferFunction::new(vec![[0.0, 0.0], [1.0, 1.0]], vec![[0.0, 1.0, 1.0, 1.0]], None)?;
-    let method = crate::scene::Method::Lao;
+/// Renders a volume whose data values are opacities.
+fn renderer(gpu: &Gpu, volume: &Volume, occlusion: Occlusion) -> Result<Renderer> {
+    let transfer = TransferFunction::new(vec![[0.0, 0.0], [1.0, 1.0]], WHITE.to_vec(), None)?;
+    let method = Method::Lao;
     let setup = Setup { occlusion, scope: Scope::All, method, ..Setup::paper(volume.min_spacing()) };
-    let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR)?;
+    Renderer::new(gpu, volume, transfer, setup, COLOUR)
+}
+
+/// Every voxel's ambient factor, computed so.
+fn computed(renderer: &mut Renderer, occlusion: Occlusion) -> Result<Vec<f32>> {
+    renderer.set_setup(Setup { occlusion, ..*renderer.setup() })?;
     renderer.update(&mut |_| ())?;
     renderer.read_ambient()
 }
@@ -216,8 +243,9 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
         Volume::new(dims, [1.0; 3], Values::F32(vec![value; dims.iter().product()]))
     };
     let numbers = |volume: &Volume, radius: f32, right: &dyn Fn(f32) -> bool| {
+        let mut renderer = renderer(gpu, volume, occlusion(Quadrature::Left, radius))?;
         for quadrature in Quadrature::ALL {
-            let values = ambient(gpu, volume, occlusion(quadrature, radius))?;
+            let values = computed(&mut renderer, occlusion(quadrature, radius))?;
             if let Some(bad) =
                 values.iter().find(|v| !(0.0..=1.0 + ROUNDING as f32).contains(*v) || !right(**v))
             {
@@ -240,7 +268,8 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
         let grid = Grid { dims, spacing: [1.0; 3] };
         let settings = occlusion(Quadrature::Left, 5.0);
         let expected = lao(&grid, &vec![0.5; grid.len()], &settings, 1.0);
-        let outcome = ambient(gpu, &volume, settings).map(|values| {
+        let values = renderer(gpu, &volume, settings).and_then(|mut r| computed(&mut r, settings));
+        let outcome = values.map(|values| {
             let off =
                 values.iter().zip(&expected).map(|(v, e)| (f64::from(*v) - e).abs()).fold(0.0, f64::max);
             let close = off <= ROUNDING && values.iter().all(|v| v.is_finite());
@@ -252,7 +281,8 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
         let mut values: Vec<f32> = (0..solid.len()).map(|i| solid.value(i) as f32).collect();
         values[1234] = value;
         let taken = || Outcome::Wrong("taken for a number".into());
-        case(&format!("{name} in a file"), through_file(&solid, &values).map(|_| taken()))?;
+        let in_file = format!("{name} in a file");
+        case(&in_file, through_file(&solid, &values).map(|_| taken()))?;
         case(
             &format!("{name} in memory"),
             Volume::new(solid.dims, [1.0; 3], Values::F32(values)).map(|_| taken()),
