@@ -2,7 +2,7 @@
 
 use crate::args::{Global, Stability, usage};
 use crate::output::{Out, Progress, check_validation, open_gpu};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use cao::measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep, page};
 use cao::volume::write_atomic;
 use serde_json::json;
@@ -20,6 +20,9 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let folder = args.output.as_deref().ok_or_else(|| usage("-o DIR is missing: where to write"))?;
+    if folder.exists() && !folder.is_dir() {
+        bail!("cannot write into {}: it is a file, expected a folder or a new name", folder.display());
+    }
     let sweeps = match args.only.is_empty() {
         true => SWEEPS.to_vec(),
         false => args.only.clone(),
@@ -32,6 +35,8 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     out.device(&gpu);
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut findings = Vec::new();
     for sweep in sweeps {
         progress.stage(sweep.name);

@@ -151,6 +151,9 @@ pub struct Finding {
     pub setting: String,
 }
 
+/// Runs a sweep, telling the share done (0 … 1). Uses the device's queue and waits for it.
+pub type Run = fn(&Gpu, Effort, &mut dyn FnMut(f64)) -> Result<Finding>;
+
 /// A sweep by its name.
 #[derive(Clone, Copy)]
 pub struct Sweep {
@@ -158,8 +161,8 @@ pub struct Sweep {
     pub name: &'static str,
     /// What it asks.
     pub title: &'static str,
-    /// Runs it, telling the share done. Uses the device's queue and waits for it.
-    pub run: fn(&Gpu, Effort, &mut dyn FnMut(f64)) -> Result<Finding>,
+    /// Runs it.
+    pub run: Run,
 }
 
 /// Every sweep, in the order of measure.md §4.
