@@ -51,9 +51,10 @@ pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
 pub struct Cells {
     camera: ClipCamera,
     mode: Mode,
-    /// Front and back depth of each cell, row-major; where a clip that removes has nothing, so far away that nothing is reached.
-    front: Vec<f64>,
-    back: Vec<f64>,
+    /// D_front is the least of front − h for a clip that removes, and the most of front + h, the least of −front − h with its
+    /// sign turned, for one that keeps; D_back the other way round.
+    front: Envelope,
+    back: Envelope,
     /// For each |dy| the half-heights of the ball over dx = −n … n, as far as it reaches.
     heights: Vec<Vec<f64>>,
     half: bool,
@@ -127,8 +128,12 @@ impl Cells {
         height: impl Fn(usize, usize) -> Option<f64>,
         half: bool,
     ) -> Self {
+        let side = camera.resolution as usize;
+        let sign = sign(mode);
+        // Where a clip that removes has nothing, nothing is reached.
         let skipped = |cell| if mode == Mode::Remove && cell == EMPTY { NOWHERE } else { cell };
-        let (front, back) = cells.map(skipped).map(|[front, back]| (front, back)).unzip();
+        let (front, back) = cells.map(skipped).map(|[front, back]| (sign * front, -sign * back)).unzip();
+        let (front, back) = (Envelope::new(side, front), Envelope::new(side, back));
         let row = |dy: usize| {
             let right: Vec<f64> = (0..=span).map_while(|dx| height(dx, dy)).collect();
             right.iter().skip(1).rev().chain(&right).copied().collect()
@@ -142,28 +147,12 @@ impl Cells {
         let (x, y) = (cell % side, cell / side);
         let span = self.heights.len() - 1;
         let past_edge = |c: usize| c < span || c + span >= side;
-        let [mut front, mut back] = NOWHERE;
-        let mut sign = 1.0;
-        if self.mode == Mode::Keep {
-            if past_edge(x) || past_edge(y) {
-                return EMPTY.map(|depth| self.stored(depth));
-            }
-            (front, back, sign) = (back, front, -1.0);
+        if self.mode == Mode::Keep && (past_edge(x) || past_edge(y)) {
+            return EMPTY.map(|depth| self.stored(depth));
         }
-        for j in y.saturating_sub(span)..=(y + span).min(side - 1) {
-            let heights = &self.heights[j.abs_diff(y)];
-            let Some(reach) = heights.len().checked_sub(1).map(|length| length / 2) else { continue };
-            let (from, to) = (x.saturating_sub(reach), (x + reach).min(side - 1));
-            let heights = &heights[from + reach - x..];
-            let row = j * side + from..=j * side + to;
-            for ((f, b), h) in self.front[row.clone()].iter().zip(&self.back[row]).zip(heights) {
-                let (f, b) = (f - sign * h, b + sign * h);
-                // Comparisons rather than f64::min, which looks for NaN: this is where the time goes.
-                let grows = self.mode == Mode::Remove;
-                front = if (f < front) == grows { f } else { front };
-                back = if (b > back) == grows { b } else { back };
-            }
-        }
+        let sign = sign(self.mode);
+        let front = sign * self.front.least(x, y, &self.heights);
+        let back = -sign * self.back.least(x, y, &self.heights);
         let found = if [front, back] == NOWHERE { EMPTY } else { [front, back] };
         found.map(|depth| self.stored(depth))
     }
@@ -181,13 +170,79 @@ impl Cells {
 
     /// All cells.
     pub fn whole(&self) -> DilationMap {
-        let intervals = each(self.front.len(), |cell| self.cell(cell));
+        let side = self.camera.resolution as usize;
+        let intervals = each(side * side, |cell| self.cell(cell));
         DilationMap {
             camera: self.camera,
             mode: self.mode,
             front: intervals.iter().map(|i| i[0]).collect(),
             back: intervals.iter().map(|i| i[1]).collect(),
         }
+    }
+}
+
+/// A removing clip's interval grows, a keeping one's shrinks.
+fn sign(mode: Mode) -> f64 {
+    if mode == Mode::Remove { 1.0 } else { -1.0 }
+}
+
+/// A square of values, and the least of each block of them, which tells the blocks that need not be looked at.
+#[derive(Clone, Debug)]
+struct Envelope {
+    side: usize,
+    values: Vec<f64>,
+    least: Vec<f64>,
+}
+
+/// Cells along an edge of an [`Envelope`]'s blocks.
+const BLOCK: usize = 16;
+
+impl Envelope {
+    fn new(side: usize, values: Vec<f64>) -> Self {
+        let blocks = side.div_ceil(BLOCK);
+        let mut least = vec![f64::INFINITY; blocks * blocks];
+        for (cell, &value) in values.iter().enumerate() {
+            let slot = &mut least[cell / side / BLOCK * blocks + cell % side / BLOCK];
+            *slot = slot.min(value);
+        }
+        Self { side, values, least }
+    }
+
+    /// The least of value − height over the cells around (x, y); `heights[|dy|]` is for dx = −n … n and nowhere grows with |dx| or |dy|.
+    fn least(&self, x: usize, y: usize, heights: &[Vec<f64>]) -> f64 {
+        let span = heights.len() - 1;
+        let blocks = self.side.div_ceil(BLOCK);
+        let reached = |c: usize| c.saturating_sub(span) / BLOCK..=((c + span) / BLOCK).min(blocks - 1);
+        let gap = |c: usize, block: usize| {
+            let first = block * BLOCK;
+            first.saturating_sub(c).max(c.saturating_sub(first + BLOCK - 1))
+        };
+        // Its own block first, so that few others can hold less.
+        let mut least = self.least_in(x / BLOCK, y / BLOCK, x, y, heights, f64::INFINITY);
+        for v in reached(y) {
+            let row = &heights[gap(y, v)];
+            for u in reached(x) {
+                // The block's highest ball is the one nearest to (x, y).
+                let highest = row.get(row.len() / 2 + gap(x, u));
+                if highest.is_some_and(|h| self.least[v * blocks + u] - h < least) {
+                    least = self.least_in(u, v, x, y, heights, least);
+                }
+            }
+        }
+        least
+    }
+
+    fn least_in(&self, u: usize, v: usize, x: usize, y: usize, heights: &[Vec<f64>], mut least: f64) -> f64 {
+        for j in v * BLOCK..((v + 1) * BLOCK).min(self.side) {
+            let Some(row) = heights.get(j.abs_diff(y)) else { continue };
+            let reach = row.len() / 2;
+            for i in u * BLOCK..((u + 1) * BLOCK).min(self.side) {
+                if i.abs_diff(x) <= reach && !row.is_empty() {
+                    least = least.min(self.values[j * self.side + i] - row[i + reach - x]);
+                }
+            }
+        }
+        least
     }
 }
 
@@ -309,6 +364,35 @@ mod tests {
                 !map.dilated(nearby(p, radius, &mut random))
             })
             .count()
+    }
+
+    /// Blocks that are not looked at hold nothing less.
+    #[test]
+    fn the_envelope_is_the_least_of_all_cells_in_reach() {
+        let mut random = Random(5);
+        for (side, radius) in [(1, 3.0), (16, 2.5), (37, 40.0), (50, 17.3), (64, 6.0)] {
+            let values: Vec<f64> = (0..side * side)
+                .map(
+                    |_| if random.unit() < 0.4 { f64::INFINITY } else { f64::from(random.within(-9.0, 9.0)) },
+                )
+                .collect();
+            let height = |dx: usize, dy: usize| {
+                let square = radius * radius - (dx * dx + dy * dy) as f64;
+                (square >= 0.0).then(|| square.sqrt())
+            };
+            let camera =
+                ClipCamera { corner: Vec3::ZERO, pixel_mm: 1.0, depth_mm: 1.0, resolution: side as u32 };
+            let cells = values.iter().map(|&v| [v, -v]);
+            let made = Cells::new(camera, Mode::Remove, cells, radius as usize, height, false);
+            for _ in 0..60 {
+                let [x, y] = [(); 2].map(|()| (random.unit() * side as f32) as usize);
+                let all = (0..side * side).filter_map(|cell: usize| {
+                    let h = height((cell % side).abs_diff(x), (cell / side).abs_diff(y))?;
+                    Some(values[cell] - h)
+                });
+                assert_eq!(made.front.least(x, y, &made.heights), all.fold(f64::INFINITY, f64::min));
+            }
+        }
     }
 
     #[test]
