@@ -3,6 +3,7 @@
 pub mod contender;
 pub mod error;
 pub mod exactness;
+pub mod flip;
 pub mod plot;
 pub mod random;
 pub mod reference;

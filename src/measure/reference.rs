@@ -3,7 +3,7 @@
 //!
 //! * [`ambient`]: the integral that ambient occlusion stands for, at the voxels that count;
 //! * [`literal`]: what the paper's sum converges to with ever more rays;
-//! * [`image`]: the picture with ambient occlusion evaluated at every sample of its rays instead of read from a volume.
+//! * [`image()`]: the picture with ambient occlusion evaluated at every sample of its rays instead of read from a volume.
 
 use super::error::{Errors, counting, errors};
 use super::random::Random;
@@ -69,8 +69,7 @@ pub fn ambient(
     plan: &Plan,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Reference> {
-    let integral =
-        Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, grid.min_spacing());
+    let integral = integral(radius_mm, offset_mm, grid, plan)?;
     volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
 }
 
@@ -86,7 +85,26 @@ pub fn literal(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Reference> {
     let integral = Integral::literal(radius_mm, plan.directions, grid.min_spacing());
+    check("radius_mm", radius_mm, 0.0)?;
     volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
+}
+
+/// The ambient integral of these lengths.
+fn integral(radius_mm: f64, offset_mm: f64, grid: &Grid, plan: &Plan) -> Result<Integral> {
+    check("radius_mm", radius_mm, 0.0)?;
+    check("offset_mm", offset_mm, 0.0)?;
+    check("steps_per_voxel", plan.steps_per_voxel.into(), 1.0)?;
+    Ok(Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, grid.min_spacing()))
+}
+
+fn check(what: &str, value: f64, least: f64) -> Result<()> {
+    if value.is_finite() && value >= least {
+        return Ok(());
+    }
+    Err(Error::Config {
+        what: what.into(),
+        problem: format!("{value}; expected a finite number of at least {least}"),
+    })
 }
 
 fn volume(
@@ -175,7 +193,7 @@ pub fn image(
 ) -> Result<ImageReference> {
     let scene = Scene::new(gpu, &frame.grid, frame.opacity)?;
     let smallest = frame.grid.min_spacing();
-    let integral = Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, smallest);
+    let integral = integral(radius_mm, offset_mm, &frame.grid, plan)?;
     let fine = Frame { step_mm: smallest / f64::from(plan.steps_per_voxel), ..*frame };
     let finer = Frame { step_mm: 0.5 * fine.step_mm, ..fine };
     let pixels: Vec<usize> = (0..size[0] * size[1]).collect();
@@ -212,6 +230,9 @@ pub fn image(
 
 /// Pixels of an image reference that are computed once more at twice the resolution, which costs eight times as much each.
 const CHECKED_PIXELS: usize = 64;
+
+/// Most samples of a ray: at thousands of directions, more keep a device busy with one point for longer than its driver waits.
+const MAX_SAMPLES: u32 = 1 << 16;
 
 /// An opacity volume on the device, with the rim that the kernel asks for.
 struct Scene<'a> {
@@ -255,6 +276,15 @@ impl<'a> Scene<'a> {
         reference_mm: f64,
         progress: &mut dyn FnMut(f64),
     ) -> Result<(Vec<f32>, f64)> {
+        check("reference_mm", reference_mm, f64::MIN_POSITIVE)?;
+        if integral.samples > MAX_SAMPLES {
+            return Err(Error::Limit {
+                what: "samples of a reference's ray".into(),
+                needed: integral.samples.into(),
+                limit: MAX_SAMPLES.into(),
+                hint: "make the radius smaller or take fewer steps a voxel".into(),
+            });
+        }
         if positions.is_empty() {
             return Ok((Vec::new(), 0.0));
         }
