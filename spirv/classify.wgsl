@@ -3,8 +3,9 @@
 //
 // Conservative, unlike the paper's recipe: a voxel is untouched only if no point that any clip hides lies within `reach`
 // of it, where `reach` covers the rays, the eight voxels that a sample interpolates and the cell of a clip sample
-// (method.md section 5). An untouched voxel therefore takes no clip samples at all. LITERAL is the paper's recipe: nine
-// samples tested against the dilation map.
+// (method.md section 5). An untouched voxel therefore takes no clip samples at all, nor does one that the bounds of its brick
+// (`clip_bricks`) or its own show to be visible or hidden as a whole. LITERAL is the paper's recipe: nine samples tested
+// against the dilation map.
 
 struct ClassifyParams {
     dims: vec3<u32>,
@@ -14,16 +15,6 @@ struct ClassifyParams {
     spacing: vec3<f32>,
     reach: f32,
     flags: u32,
-}
-
-struct Positions {
-    // in the voxel's [-1, 1]^3
-    sample: array<vec4<f32>, 32>,
-}
-
-struct Dilation {
-    // for each pair: front map, back map, as in Layers
-    depth: array<f32>,
 }
 
 struct Count {
@@ -41,8 +32,10 @@ const LITERAL = 1u;
 @group(0) @binding(5) var opacity: texture_storage_3d<r32float, write>;
 @group(0) @binding(6) var mask: texture_storage_3d<r8uint, write>;
 @group(0) @binding(7) var<storage, read_write> count: Count;
+@group(0) @binding(8) var<storage, read> clip_bricks: ClipBricks;
 
-#include "shared/clips.wgsl"
+#include "shared/clip_opacity.wgsl"
+#include "shared/reach.wgsl"
 
 var<immediate> params: ClassifyParams;
 
@@ -72,91 +65,92 @@ fn in_dilation(c: u32, rigid: vec3<f32>) -> bool {
 // Whether some point that clip c hides may lie within reach of the voxel at this world position.
 fn in_reach(c: u32, world: vec3<f32>) -> bool {
     let rigid = rigid_of(c, world);
-    let kind = clips.clip[c].kind;
-    var distance = 0.0;
-    switch kind {
-        case MESH: {
-            return in_dilation(c, rigid);
-        }
-        case PLANE: {
-            distance = -rigid.z;
-        }
-        case BOX: {
-            distance = box_distance(rigid, clips.clip[c].scale.xyz);
-        }
-        default: {
-            distance = local_distance(kind, rigid / clips.clip[c].scale.xyz) * clips.clip[c].scale.w;
-        }
+    if clips.clip[c].kind == MESH {
+        return in_dilation(c, rigid);
     }
-    return select(distance, -distance, clips.clip[c].keep != 0u) <= params.reach + clips.clip[c].cells.w;
+    return distance_to_hidden(c, rigid) <= params.reach + clips.clip[c].cells.w;
 }
 
-fn any_in_reach(world: vec3<f32>) -> bool {
+// The same for any clip, in a brick with this word of ClipBricks.
+fn any_in_reach(code: u32, world: vec3<f32>) -> bool {
+    let known = code >> 2u & 3u;
+    if known != SOME {
+        return known == ALL;
+    }
     for (var c = 0u; c < clips.count; c++) {
-        if in_reach(c, world) {
+        if (code >> (12u + c) & 1u) != 0u && in_reach(c, world) {
             return true;
         }
     }
     return false;
 }
 
-// Centre, then the eight corners.
-fn first_nine(i: u32) -> vec3<f32> {
-    if i == 0u {
-        return vec3(0.0);
-    }
-    let corner = i - 1u;
-    return vec3<f32>(vec3(corner & 1u, corner >> 1u & 1u, corner >> 2u)) * 2.0 - 1.0;
-}
-
-fn classify(voxel: vec3<u32>) -> u32 {
+fn classify(voxel: vec3<u32>, code: u32) -> u32 {
     let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
     let half_edges = 0.5 * params.spacing;
     let literal = (params.flags & LITERAL) != 0u;
     let full = textureLoad(full_opacity, voxel, 0).r;
-    var dilated = any_in_reach(centre);
+    var dilated = any_in_reach(code, centre);
     if !dilated && !literal {
         textureStore(opacity, voxel, vec4(full, 0.0, 0.0, 0.0));
         return 2u;
     }
-    var seen = 0u;
-    for (var i = 0u; i < 9u; i++) {
-        let sample = centre + first_nine(i) * half_edges;
-        seen += u32(visible(sample));
-        if literal && any_in_reach(sample) {
-            dilated = true;
+    if literal {
+        for (var i = 1u; i < 9u; i++) {
+            dilated = dilated || any_in_reach(code, centre + first_nine(i) * half_edges);
         }
     }
-    var value = full;
-    if seen == 0u {
-        value = 0.0;
-    } else if seen < 9u {
-        for (var i = 0u; i < params.extra_samples; i++) {
-            seen += u32(visible(centre + positions.sample[i].xyz * half_edges));
-        }
-        value = f32(seen) / f32(9u + params.extra_samples) * full;
-    }
-    textureStore(opacity, voxel, vec4(value, 0.0, 0.0, 0.0));
+    let share = visible_share(code, centre, half_edges, params.extra_samples);
+    textureStore(opacity, voxel, vec4(share * full, 0.0, 0.0, 0.0));
     if !dilated {
         return 2u;
     }
-    return u32(seen > 0u);
+    return u32(share > 0.0);
 }
 
+// Category of all voxels of a brick with this word, 3 where they may differ.
+fn common_category(code: u32) -> u32 {
+    let visibility = code & 3u;
+    let reach = code >> 2u & 3u;
+    if reach == NONE && visibility == VISIBLE {
+        return 2u;
+    }
+    if reach != ALL {
+        return 3u;
+    }
+    return select(select(3u, 1u, visibility == VISIBLE), 0u, visibility == HIDDEN);
+}
+
+// Two workgroups a brick, so that all invocations of one go the same way wherever the brick's word decides.
 @compute @workgroup_size(8, 8, 4)
-fn main(@builtin(global_invocation_id) voxel: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn main(
+    @builtin(global_invocation_id) voxel: vec3<u32>,
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let bricks = (params.dims + 7u) / 8u;
+    let code = clip_bricks.code[(group.z / 2u * bricks.y + group.y) * bricks.x + group.x];
+    let shared_category = common_category(code);
     if lane < 3u {
         atomicStore(&in_group[lane], 0u);
     }
     workgroupBarrier();
     if all(voxel < params.dims) {
-        let category = classify(voxel);
-        textureStore(mask, voxel, vec4(category, 0u, 0u, 0u));
-        atomicAdd(&in_group[category], 1u);
+        if shared_category < 3u {
+            let full = textureLoad(full_opacity, voxel, 0).r;
+            textureStore(opacity, voxel, vec4(select(0.0, full, shared_category > 0u), 0.0, 0.0, 0.0));
+            textureStore(mask, voxel, vec4(shared_category, 0u, 0u, 0u));
+        } else {
+            let category = classify(voxel, code);
+            textureStore(mask, voxel, vec4(category, 0u, 0u, 0u));
+            atomicAdd(&in_group[category], 1u);
+        }
     }
     workgroupBarrier();
     if lane < 3u {
-        let n = atomicLoad(&in_group[lane]);
+        let first = group * vec3(8u, 8u, 4u);
+        let here = min(params.dims - first, vec3(8u, 8u, 4u));
+        let n = select(atomicLoad(&in_group[lane]), here.x * here.y * here.z, lane == shared_category);
         if n > 0u {
             atomicAdd(&count.category[lane], n);
         }

@@ -39,7 +39,7 @@
 //!   (`p = T + Rz·Ry·Rx·(S·p_local)`); column vectors, matrices as [`glam`] has them.
 //! * **Eyes** look along -z of their frame, +y is up, +x to the right, as in OpenXR; the field of view is four signed
 //!   tangents. Clip space is Vulkan's: y down, depth 0 at the near plane and 1 at the far plane. Rows of images and `uv`
-//!   start at the top left. Index 0 is the left eye.
+//!   start at the top left. Index 0 is the left eye, 1 the right one, 2 and 3 are their insets where there are four views.
 //! * **Opacity** is in 0 … 1 *per reference length* (by default the smallest spacing): a path of length `s` lets
 //!   `(1 - a)^(s / reference)` through. Between voxels it is trilinear, and voxels outside the volume count as 0, so that it
 //!   fades over one voxel beyond the outermost centres.

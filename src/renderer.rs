@@ -370,14 +370,19 @@ impl Renderer {
             &[Access::TransferWrite, Access::SampledRead, Access::GraphicsRead, Access::TransferRead],
             &[Access::StorageRead, Access::StorageWrite],
         );
+        let reach = Classify::reach(&self.field, &self.setup.occlusion);
         rec.stage("classify")?;
+        let clip_bricks = &self.volumes.clip_bricks;
+        self.kernels.clip_bricks.record(rec, &self.field, &self.clip_set, reach, clip_bricks)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         self.kernels.classify.record(
             rec,
             &self.field,
             &self.clip_set,
             self.setup.anti_aliasing,
-            Classify::reach(&self.field, &self.setup.occlusion),
+            reach,
             self.setup.maps.literal,
+            clip_bricks,
             &self.volumes.full_opacity,
             &self.volumes.opacity,
             &self.volumes.mask,

@@ -11,6 +11,7 @@ use cao::measure::random::Random;
 use cao::method::volumes::volume_image;
 use cao::occlusion::{Occlusion, Quadrature, RaySet};
 use cao::stage::classify::{AntiAliasing, Classify};
+use cao::stage::clip_bricks::ClipBricks;
 use cao::stage::clips::{ClipSet, MapSettings};
 use cao::stage::dilate::Dilate;
 use cao::stage::peel::Peel;
@@ -32,6 +33,7 @@ const UNDECIDED: f32 = 0.02;
 struct Bench<'a> {
     gpu: &'a Gpu,
     classify: Classify,
+    clip_bricks: ClipBricks,
     peel: Peel,
     dilate: Dilate,
 }
@@ -44,8 +46,13 @@ struct Found {
 
 impl<'a> Bench<'a> {
     fn new(gpu: &'a Gpu) -> Self {
-        let (classify, peel) = (Classify::new(gpu).unwrap(), Peel::new(gpu).unwrap());
-        Self { gpu, classify, peel, dilate: Dilate::new(gpu).unwrap() }
+        Self {
+            gpu,
+            classify: Classify::new(gpu).unwrap(),
+            clip_bricks: ClipBricks::new(gpu).unwrap(),
+            peel: Peel::new(gpu).unwrap(),
+            dilate: Dilate::new(gpu).unwrap(),
+        }
     }
 
     fn run(
@@ -69,14 +76,21 @@ impl<'a> Bench<'a> {
         let opacity = volume_image(gpu, "opacity", &field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", &field, Format::R8Uint).unwrap();
         let count = &self.classify.count;
+        let words = ClipBricks::buffer(gpu, &field).unwrap();
         run(gpu, |rec| {
             rec.discard(&opacity);
             rec.discard(&mask);
             set.record(rec, clips, half_mm).unwrap();
             rec.fill(count, 0, count.bytes(), 0).unwrap();
-            rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+            self.clip_bricks.record(rec, &field, &set, reach, &words).unwrap();
+            rec.barrier(
+                &[Access::TransferWrite, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
             let literal = maps.literal;
-            self.classify.record(rec, &field, &set, samples, reach, literal, &full, &opacity, &mask).unwrap();
+            self.classify
+                .record(rec, &field, &set, samples, reach, literal, &words, &full, &opacity, &mask)
+                .unwrap();
         });
         Found {
             opacity: read_floats(gpu, &opacity),

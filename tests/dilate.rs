@@ -106,6 +106,7 @@ fn each_pair_is_dilated_as_the_twin_does_it() {
                             cells: wide,
                             layers_at: 5,
                             dilation_at: 3,
+                            blocks_at: 0,
                             keep,
                             literal,
                         };
@@ -175,8 +176,16 @@ fn no_point_within_the_radius_is_missed() {
         let radius = random.between(0.05, 0.3) * camera.pixel_mm * resolution as f32;
         let layers = random_layers(&mut random, camera, pairs, keep);
         let wide = camera.widened(radius, cells);
-        let clip =
-            MeshClip { camera, pairs, cells: wide, layers_at: 0, dilation_at: 0, keep, literal: false };
+        let clip = MeshClip {
+            camera,
+            pairs,
+            cells: wide,
+            layers_at: 0,
+            dilation_at: 0,
+            blocks_at: 0,
+            keep,
+            literal: false,
+        };
         let maps = on_device(&gpu, &kernel, &clip, radius, &layers);
         // p in pixels and depths of the layers.
         let inside = |maps: &[f32], of: ClipCamera, p: Vec3| {

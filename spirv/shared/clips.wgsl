@@ -20,6 +20,11 @@ struct Clip {
     per_depth: f32,
     // meshes: corner x, y of the dilation maps in the rigid frame, 1 / cell edge; all: bound of rounding in mm
     cells: vec4<f32>,
+    // meshes: place in `layers` of the bounds of blocks
+    blocks_at: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
 }
 
 struct Clips {
@@ -31,7 +36,9 @@ struct Clips {
 }
 
 struct Layers {
-    // for each pair: front map, back map; rows of y, x fastest; depth 0 ... 1 of the clip camera; empty: front 1
+    // for each pair: front map, back map; rows of y, x fastest; depth 0 ... 1 of the clip camera; empty: front 1. Behind them, for
+    // each pair, over blocks of 16 x 16 pixels: nearest front and farthest back (2 and -1 where nothing is inside), farthest
+    // front and nearest back (2 and -1 where a pixel has no inside)
     depth: array<f32>,
 }
 

@@ -5,6 +5,7 @@
 
 pub mod bricks;
 pub mod classify;
+pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;

@@ -1,5 +1,6 @@
 //! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and where methods stop holding.
 
+pub mod chart;
 pub mod contender;
 pub mod error;
 pub mod exactness;

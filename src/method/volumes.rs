@@ -5,10 +5,11 @@ use crate::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, Image
 use crate::occlusion::Occlusion;
 use crate::stage::bricks::{BrickList, Bricks};
 use crate::stage::classify::Classify;
+use crate::stage::clip_bricks::ClipBricks;
 use crate::stage::field::Field;
 use crate::stage::lao::{Lao, Scope};
 
-/// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 12 a brick of 512.
+/// Device memory of one scene, beside the volume itself (CAO Fig. 3). 17 bytes a voxel and a little over 16 a brick of 512.
 pub struct Volumes {
     /// Opacity before clipping, r32float.
     pub full_opacity: Image,
@@ -20,6 +21,8 @@ pub struct Volumes {
     pub precomputed: Image,
     /// V_AO, r32float.
     pub ambient: Image,
+    /// What the clips do to each brick, u32 each.
+    pub clip_bricks: Buffer,
     /// Bricks that the ray cast cannot skip, u32 each.
     pub occupancy: Buffer,
     /// Bricks that the last contextual update changed, u32 each.
@@ -38,6 +41,7 @@ impl Volumes {
             mask: volume_image(gpu, "mask", field, Format::R8Uint)?,
             precomputed: volume_image(gpu, "precomputed ambient", field, Format::R32Float)?,
             ambient: volume_image(gpu, "ambient", field, Format::R32Float)?,
+            clip_bricks: ClipBricks::buffer(gpu, field)?,
             occupancy: gpu.buffer("occupancy", bricks, BufferUse::Device)?,
             changed_before: gpu.buffer("changed before", bricks, BufferUse::Device)?,
             list: BrickList::new(gpu, field)?,
@@ -64,6 +68,8 @@ pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Res
 
 /// The kernels that methods share.
 pub struct Kernels {
+    /// What bounds say of whole bricks, for stage 4.
+    pub clip_bricks: ClipBricks,
     /// Stage 4, and the reach of its clips.
     pub classify: Classify,
     /// Compaction.
@@ -75,7 +81,12 @@ pub struct Kernels {
 impl Kernels {
     /// Builds the pipelines. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { classify: Classify::new(gpu)?, bricks: Bricks::new(gpu)?, lao: Lao::new(gpu)? })
+        Ok(Self {
+            clip_bricks: ClipBricks::new(gpu)?,
+            classify: Classify::new(gpu)?,
+            bricks: Bricks::new(gpu)?,
+            lao: Lao::new(gpu)?,
+        })
     }
 }
 

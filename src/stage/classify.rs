@@ -1,9 +1,9 @@
 //! Clip classification (CAO §3.5 step 4): opacity after clipping, anti-aliased by eq. (5),
 //! `O_AA = C_visible / (N + 9) · O_voxel`, and the category of every voxel.
 //!
-//! In: `full_opacity`, the clips with layers and dilation maps. Out: `opacity` V_o (3D r32float), `mask` V_m (3D r8uint: 0 = a
-//! clipped, 1 = b affected, 2 = c untouched), `count` of each. Cost: one distance a voxel and clip; 9 or 9 + N samples only
-//! for voxels within reach of a clip.
+//! In: `full_opacity`, the clips with layers and dilation maps, the words of `clip_bricks`. Out: `opacity` V_o (3D r32float), `mask` V_m (3D r8uint: 0 = a
+//! clipped, 1 = b affected, 2 = c untouched), `count` of each. Cost: one distance a voxel and clip
+//! where the brick's word leaves it open; 9 or 9 + N samples only for voxels that a clip's surface may pass.
 
 use super::clips::ClipSet;
 use super::device_buffer;
@@ -62,7 +62,7 @@ impl Classify {
         occlusion.reach(f64::from(field.min_spacing())) + (1.5 + 1e-2) * field.diagonal()
     }
 
-    /// Classifies every voxel. `count` must have been cleared.
+    /// Classifies every voxel. `count` must have been cleared; `clip_bricks` is of the same clips and reach.
     #[expect(clippy::too_many_arguments, reason = "each is one binding or parameter of the kernel")]
     pub fn record(
         &self,
@@ -72,6 +72,7 @@ impl Classify {
         samples: AntiAliasing,
         reach: f32,
         literal: bool,
+        clip_bricks: &Buffer,
         full_opacity: &Image,
         opacity: &Image,
         mask: &Image,
@@ -93,6 +94,7 @@ impl Classify {
             ("opacity", Bind::Image(opacity)),
             ("mask", Bind::Image(mask)),
             ("count", Bind::Buffer(&self.count)),
+            ("clip_bricks", Bind::Buffer(clip_bricks)),
         ];
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)
     }

@@ -30,9 +30,14 @@ struct ClipData {
     dilation_resolution: u32,
     per_depth: f32,
     cells: [f32; 4],
+    blocks_at: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
 }
 layout_check!(ClipData => shaders::classify::CLIP {
-    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth, cells
+    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth, cells,
+    blocks_at, pad0, pad1, pad2
 });
 
 #[repr(C)]
@@ -99,6 +104,8 @@ pub struct MeshClip {
     pub layers_at: u32,
     /// First f32 of the dilation maps.
     pub dilation_at: u32,
+    /// First f32 of the bounds of blocks of the layers, behind all layers.
+    pub blocks_at: u32,
     /// The outside is hidden.
     pub keep: bool,
     /// See [`MapSettings::literal`].
@@ -216,6 +223,7 @@ impl ClipSet {
                 cells: if settings.literal { camera } else { camera.widened(radius, settings.cells) },
                 layers_at,
                 dilation_at,
+                blocks_at: 0,
                 keep,
                 literal: settings.literal,
             });
@@ -225,7 +233,12 @@ impl ClipSet {
         if meshes.is_empty() {
             return Ok(timings);
         }
-        let all: Vec<f32> = self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
+        let mut all: Vec<f32> =
+            self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
+        for (mesh, have) in meshes.iter_mut().zip(&self.peeled) {
+            mesh.blocks_at = all.len() as u32;
+            all.extend(block_bounds(&have.layers.depth, settings.resolution as usize));
+        }
         self.layers = super::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
         self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
         let most = meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
@@ -276,8 +289,10 @@ impl ClipSet {
                     slot.layers_at = map.layers_at;
                     slot.resolution = map.camera.resolution;
                     slot.dilation_at = map.dilation_at;
+                    slot.blocks_at = map.blocks_at;
                     slot.dilation_resolution = map.cells.resolution;
-                    slot.cells = [map.cells.corner.x, map.cells.corner.y, 1.0 / map.cells.pixel_mm, 0.0];
+                    let corner = map.cells.corner;
+                    slot.cells[..3].copy_from_slice(&[corner.x, corner.y, 1.0 / map.cells.pixel_mm]);
                     slot.per_depth = 1.0 / map.camera.depth_mm;
                     6
                 }
@@ -288,6 +303,37 @@ impl ClipSet {
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
         Ok(())
     }
+}
+
+/// Edge in pixels of the blocks of depth layers that `clip_bricks` looks at instead of pixels.
+const BLOCK: usize = 16;
+
+/// Of layers as [`Layers::depth`] has them, for each pair: nearest front, farthest back, farthest front and nearest back
+/// of each block of 16² pixels, rows of y. A pixel with nothing inside counts as front 2 and back −1, behind and before
+/// everything.
+fn block_bounds(depth: &[f32], resolution: usize) -> Vec<f32> {
+    let edge = resolution.div_ceil(BLOCK);
+    let mut bounds = Vec::new();
+    for pair in depth.chunks_exact(2 * resolution * resolution) {
+        let (front, back) = pair.split_at(resolution * resolution);
+        let mut pair = [(); 4].map(|()| Vec::with_capacity(edge * edge));
+        for block in 0..edge * edge {
+            let range = |at: usize| at * BLOCK..((at + 1) * BLOCK).min(resolution);
+            let mut b = [2.0_f32, -1.0, -1.0, 2.0];
+            for pixel in
+                range(block / edge).flat_map(|y| range(block % edge).map(move |x| y * resolution + x))
+            {
+                let (f, k) = match (front[pixel], back[pixel]) {
+                    (f, k) if f < k => (f, k),
+                    _ => (2.0, -1.0),
+                };
+                b = [b[0].min(f), b[1].max(k), b[2].max(f), b[3].min(k)];
+            }
+            pair.iter_mut().zip(b).for_each(|(list, bound)| list.push(bound));
+        }
+        bounds.extend(pair.into_iter().flatten());
+    }
+    bounds
 }
 
 fn check(clips: &[Clip]) -> Result<()> {

@@ -3,6 +3,7 @@
 
 pub mod bricks;
 pub mod classify;
+pub mod clip_bricks;
 pub mod clips;
 pub mod compare;
 pub mod consistency;

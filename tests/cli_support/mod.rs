@@ -8,6 +8,7 @@ use std::process::{Command, Stdio};
 /// A folder that is deleted at the end, with the program run in it.
 pub struct Folder {
     folder: tempfile::TempDir,
+    program: &'static str,
     environment: Vec<(&'static str, &'static str)>,
 }
 
@@ -26,14 +27,24 @@ pub struct Run {
 impl Folder {
     /// Runs use the device, under validation: the program fails when the layer says anything.
     pub fn with_device() -> Self {
-        Self { folder: tempfile::tempdir().unwrap(), environment: vec![("CAO_VALIDATION", "1")] }
+        Self::with(vec![("CAO_VALIDATION", "1")])
     }
 
     /// Runs find no Vulkan driver: whatever they say, they say before they ask for a device.
     pub fn without_device() -> Self {
         // The older name of the variable is for older loaders.
         let environment = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].map(|name| (name, "/nonexistent")).to_vec();
-        Self { folder: tempfile::tempdir().unwrap(), environment }
+        Self::with(environment)
+    }
+
+    fn with(environment: Vec<(&'static str, &'static str)>) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        Self { folder, program: env!("CARGO_BIN_EXE_cao"), environment }
+    }
+
+    /// The same with another program than `cao`.
+    pub fn running(self, program: &'static str) -> Self {
+        Self { program, ..self }
     }
 
     /// Path of a file in the folder.
@@ -58,7 +69,7 @@ impl Folder {
 
     /// The program with these arguments, not yet started.
     pub fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_cao"));
+        let mut command = Command::new(self.program);
         command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
         command.envs(self.environment.iter().copied());
         command
@@ -69,7 +80,7 @@ impl Folder {
         let output = self.command(&arguments.split_whitespace().collect::<Vec<_>>()).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
         let run = Run {
-            line: format!("cao {arguments}"),
+            line: format!("{} {arguments}", self.program),
             code: output.status.code(),
             out: text(output.stdout),
             err: text(output.stderr),

@@ -1,7 +1,7 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in `common`.
 
 pub use crate::common::args::{Global, Raw, Settings, open, setup, shape, usage};
-use crate::common::args::{length, number, size, three, triple};
+use crate::common::args::{length, number, positive, size, three, triple};
 use anyhow::{Context, Result};
 use cao::clip::{Clip, Mode, Pose};
 use cao::measure::stability::Sweep;
@@ -48,6 +48,9 @@ pub enum Command {
     /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(Verify),
+    /// Chart time against error for every method after every kind of change, on this device
+    #[command(after_help = CHART_EXAMPLES)]
+    Chart(Chart),
     /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
     #[command(after_help = STABILITY_EXAMPLES)]
     Stability(Stability),
@@ -81,6 +84,17 @@ Examples:
   cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
 
 Exit code 1 if any voxel or any point that both eyes see differs.";
+
+const CHART_EXAMPLES: &str = "\
+Examples:
+  cao chart -o chart                      three built-in scenes, some ten minutes
+                                          without a GPU
+  cao chart --quick -o chart              a first look, two minutes
+  cao chart head.nrrd --transfer ct-bone --radius-mm 20 -o chart
+  cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
+
+Writes report.html, which stands alone, chart.svg, chart.png and runs.csv, every
+run of every method. A scene without clips gets a ball.";
 
 const STABILITY_EXAMPLES: &str = "\
 Examples:
@@ -197,6 +211,32 @@ pub struct Verify {
     pub all_voxels: bool,
     #[command(flatten)]
     pub settings: Settings,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Chart {
+    /// Scene files (.toml), volume files, or builtin:NAME:SIZE [default: engine, fruit, skeleton]
+    pub scenes: Vec<String>,
+    /// Folder for report, chart and numbers; made where there is none
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Fewer settings, smaller built-in scenes, a coarser reference
+    #[arg(long)]
+    pub quick: bool,
+    /// A peers.json of tools/peers, for a table of other systems in the report
+    #[arg(long, value_name = "FILE")]
+    pub peers: Option<PathBuf>,
+    /// Timed runs of every method and change
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub runs: u32,
+    /// Opacity and colour of values, as in `cao render` [default: the scene's, auto for volumes]
+    #[arg(long, value_name = "FILE|PRESET")]
+    pub transfer: Option<String>,
+    /// Length of the rays in mm [default: the scene's; 8 voxels for the default scenes, else 20]
+    #[arg(long, value_name = "R", value_parser = positive, allow_hyphen_values = true)]
+    pub radius_mm: Option<f32>,
     #[command(flatten)]
     pub raw: Raw,
 }

@@ -1,6 +1,7 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+mod chart;
 #[path = "../common/mod.rs"]
 mod common;
 mod devices;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&cli.global, a, of_command),
         args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
         args::Command::Verify(a) => verify::run(&cli.global, a),
+        args::Command::Chart(a) => chart::run(&cli.global, a),
         args::Command::Stability(a) => stability::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),

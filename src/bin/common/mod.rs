@@ -1,5 +1,7 @@
 //! What the programs share: flags, what is printed, progress, how they end.
 
+#![allow(dead_code, reason = "each program uses a part of it")]
+
 pub mod args;
 pub mod output;
 

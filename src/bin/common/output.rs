@@ -32,6 +32,11 @@ impl Out {
         self.text.push('\n');
     }
 
+    /// All lines so far.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Fields for machines.
     pub fn json(&mut self, fields: Value) {
         if let Value::Object(fields) = fields {
@@ -60,11 +65,17 @@ impl Out {
 
     /// How occlusion was computed.
     pub fn setup(&mut self, setup: &Setup, volume: &Volume) {
+        let method = if setup.method == Method::Cao { "cao" } else { "lao" };
+        self.json(json!({ "method": method }));
+        self.occlusion(method, setup, volume);
+    }
+
+    /// The rays that these methods cast.
+    pub fn occlusion(&mut self, methods: &str, setup: &Setup, volume: &Volume) {
         let o = setup.occlusion;
         let spacing = volume.min_spacing();
-        let method = if setup.method == Method::Cao { "cao" } else { "lao" };
         self.line(format!(
-            "method    {method}, rays {}, quadrature {}, radius {} mm in {} steps of {} mm, first sample at {} mm",
+            "method    {methods}, rays {}, quadrature {}, radius {} mm in {} steps of {} mm, first sample at {} mm",
             o.rays.name(),
             o.quadrature.name(),
             o.radius_mm,
@@ -73,7 +84,7 @@ impl Out {
             o.first(spacing)
         ));
         self.json(json!({
-            "method": method, "rays": o.rays.name(), "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
+            "rays": o.rays.name(), "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
             "samples": o.samples(spacing), "step_mm": o.step(spacing), "first_sample_mm": o.first(spacing)
         }));
     }
@@ -222,6 +233,11 @@ impl Progress {
                 bar.enable_steady_tick(Duration::from_millis(100));
             }
         });
+    }
+
+    /// What goes on in the stage just now.
+    pub fn say(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
     }
 
     /// Share of the stage that is done, 0 … 1.

@@ -40,6 +40,13 @@ pub fn all(asked: &Asked) -> Vec<Entry> {
     METHODS.iter().flat_map(|entries| entries(asked)).collect()
 }
 
+/// Place of a method in the legend.
+pub fn place(method: &str) -> usize {
+    let asked = Asked { min_spacing: 1.0, quick: true };
+    let named = |entries: &fn(&Asked) -> Vec<Entry>| entries(&asked).iter().any(|e| e.method == method);
+    METHODS.iter().position(named).unwrap_or(METHODS.len())
+}
+
 /// What settings depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked {

@@ -4,6 +4,7 @@ use super::{Ambient, Change, Contender, Entry, Setting, State, Subject};
 use crate::Result;
 use crate::gpu::Timings;
 use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
+use crate::scene::Method;
 use crate::stage::eyes::Look;
 
 /// A method at the setting that `setup` and `details` say.
@@ -53,7 +54,12 @@ pub fn change_to(renderer: &mut Renderer, setup: Setup, change: Change, state: &
 impl Contender for Rendered<'_> {
     fn update(&mut self, change: Change, state: &State) -> Result<Timings> {
         change_to(&mut self.renderer, self.setup, change, state)?;
-        self.renderer.update(&mut |_| ())
+        let mut timings = self.renderer.update(&mut |_| ())?;
+        if self.setup.method == Method::Lao {
+            // Maps of what the clips affect, which the renderer keeps ready for another method; a full computation asks for none (CAO §4).
+            timings.retain(|(stage, _)| stage != "dilate");
+        }
+        Ok(timings)
     }
 
     fn ambient(&self) -> Result<Ambient> {

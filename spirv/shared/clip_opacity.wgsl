@@ -1,0 +1,72 @@
+// Share of a voxel that no clip hides, anti-aliased (CAO eq. (5)): what opacity is multiplied with. Needs the bindings
+// `clips`, `layers` and `positions`.
+
+#include "shared/clips.wgsl"
+#include "shared/clip_bounds.wgsl"
+
+struct Positions {
+    // in the voxel's [-1, 1]^3
+    sample: array<vec4<f32>, 32>,
+}
+
+// Centre, then the eight corners.
+fn first_nine(i: u32) -> vec3<f32> {
+    if i == 0u {
+        return vec3(0.0);
+    }
+    let corner = i - 1u;
+    return vec3<f32>(vec3(corner & 1u, corner >> 1u & 1u, corner >> 2u)) * 2.0 - 1.0;
+}
+
+// Whether none of these clips hides the point: a bit for each.
+fn visible_to(among: u32, world: vec3<f32>) -> bool {
+    for (var c = 0u; c < clips.count; c++) {
+        if (among >> c & 1u) != 0u && inside(c, world) == (clips.clip[c].keep == 0u) {
+            return false;
+        }
+    }
+    return true;
+}
+
+// What the bounds of these clips say of one voxel; of meshes, whose layers only samples decide, nothing.
+fn voxel_visibility(among: u32, centre: vec3<f32>, half_edges: vec3<f32>) -> u32 {
+    var all = VISIBLE;
+    for (var c = 0u; c < clips.count && all != HIDDEN; c++) {
+        if (among >> c & 1u) == 0u {
+            continue;
+        }
+        if clips.clip[c].kind == MESH {
+            all = joined_visibility(all, SAMPLED);
+        } else {
+            all = joined_visibility(all, shape_visibility(c, rigid_of(c, centre), half_edges));
+        }
+    }
+    return all;
+}
+
+// The share of the voxel with this centre in mm, in a brick with this word of ClipBricks. Samples are taken only where neither
+// the brick's bounds nor the voxel's own decide, which changes no bit of the answer. `more` is N of eq. (5).
+fn visible_share(code: u32, centre: vec3<f32>, half_edges: vec3<f32>, more: u32) -> f32 {
+    let cutting = code >> 4u & 0xffu;
+    var known = code & 3u;
+    if known == CUT {
+        known = voxel_visibility(cutting, centre, half_edges);
+    }
+    if known == VISIBLE {
+        return 1.0;
+    }
+    if known == HIDDEN {
+        return 0.0;
+    }
+    var seen = 0u;
+    for (var i = 0u; i < 9u; i++) {
+        seen += u32(visible_to(cutting, centre + first_nine(i) * half_edges));
+    }
+    if seen == 0u || seen == 9u {
+        return f32(seen / 9u);
+    }
+    for (var i = 0u; i < more; i++) {
+        seen += u32(visible_to(cutting, centre + positions.sample[i].xyz * half_edges));
+    }
+    return f32(seen) / f32(9u + more);
+}

@@ -1,0 +1,63 @@
+//! Every frame as a line of comma-separated values.
+
+use super::frames::{Configuration, Measured};
+use std::fmt::Write;
+
+/// Columns. Times in ms, lengths in mm.
+const HEADER: &str = "volume,x,y,z,rays,quadrature,radius_mm,width,height,views,method,run,frame,frame_ms,clipping_ms,\
+    spherical_ray_cast_ms,rendering_ms,overhead_ms,voxels_clipped,voxels_affected,voxels_untouched";
+
+/// All frames of all configurations; runs count from 1, frames from 0.
+pub fn table(results: &[(Configuration, Vec<Measured>)]) -> String {
+    let mut text = format!("{HEADER}\n");
+    for (c, measured) in results {
+        let ([x, y, z], o) = (c.input.volume.dims, c.setup.occlusion);
+        let setting = format!(
+            "{},{x},{y},{z},{},{},{},{},{},{}",
+            quoted(&c.input.name),
+            o.rays.name(),
+            o.quadrature.name(),
+            o.radius_mm,
+            c.size[0],
+            c.size[1],
+            c.views
+        );
+        for m in measured {
+            for (run, frames) in m.runs.iter().enumerate() {
+                for (n, frame) in frames.iter().enumerate() {
+                    let [clipping, rays, rendering, overhead] = frame.parts();
+                    let v = frame.categories;
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(
+                        text,
+                        "{setting},{},{},{n},{:.4},{clipping:.4},{rays:.4},{rendering:.4},{overhead:.4},{},{},{}",
+                        m.method,
+                        run + 1,
+                        frame.wall,
+                        v.clipped,
+                        v.affected,
+                        v.untouched
+                    );
+                }
+            }
+        }
+    }
+    text
+}
+
+/// A field that a comma or a quote inside does not end (RFC 4180).
+fn quoted(field: &str) -> String {
+    match field.contains([',', '"', '\n']) {
+        true => format!("\"{}\"", field.replace('"', "\"\"")),
+        false => field.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn fields_with_commas_and_quotes_are_quoted() {
+        assert_eq!(super::quoted("builtin:engine:8"), "builtin:engine:8");
+        assert_eq!(super::quoted("a,\"b\".nrrd"), "\"a,\"\"b\"\".nrrd\"");
+    }
+}
