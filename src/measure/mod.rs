@@ -1,4 +1,5 @@
-//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and which settings a budget affords.
+//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, which settings a budget affords, and
+//! where methods stop holding.
 
 pub mod chart;
 pub mod contender;
@@ -10,3 +11,4 @@ pub mod plot;
 pub mod random;
 pub mod reference;
 pub mod ssim;
+pub mod stability;

@@ -4,6 +4,7 @@ pub use crate::common::args::{Global, Raw, Settings, open, setup, shape, usage};
 use crate::common::args::{length, number, positive, size, three, triple};
 use anyhow::{Context, Result};
 use cao::clip::{Clip, Mode, Pose};
+use cao::measure::stability::Sweep;
 use cao::scene::Method;
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
@@ -50,6 +51,9 @@ pub enum Command {
     /// Chart time against error for every method after every kind of change, on this device
     #[command(after_help = CHART_EXAMPLES)]
     Chart(Chart),
+    /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
     /// Show a volume's header, value range and histogram
     Info(Info),
     /// List the Vulkan devices
@@ -93,6 +97,15 @@ Examples:
 
 Writes report.html, which stands alone, chart.svg, chart.png and runs.csv, every
 run of every method. A scene without clips gets a ball.";
+
+const STABILITY_EXAMPLES: &str = "\
+Examples:
+  cao stability -o stability            all sweeps; open stability/index.html
+  cao stability -o out --quick --only stereo,views
+  cao stability --list
+
+Exit code 1 if ours fails where it claims to hold, or the method that a sweep
+is there to catch does not.";
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
 #[derive(Args)]
@@ -254,6 +267,22 @@ pub struct Chart {
     pub radius_mm: Option<f32>,
     #[command(flatten)]
     pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Stability {
+    /// Folder for index.html, and for each sweep its data (CSV) and charts (SVG, PNG); made where missing
+    #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Only these sweeps, as --list names them
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Sweep::parse(s))]
+    pub only: Vec<Sweep>,
+    /// Fewer and coarser steps: under a minute instead of some minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Name the sweeps, and do nothing else
+    #[arg(long)]
+    pub list: bool,
 }
 
 #[derive(Args)]
