@@ -58,7 +58,7 @@
 //! let volume = cao::volume::open("builtin:engine:64")?; // or the path of a file
 //! let transfer = TransferFunction::load("auto", volume.range())?;
 //! let gpu = Gpu::open(&OpenOptions::default())?;
-//! let setup = Setup::paper(volume.min_spacing());
+//! let setup = Setup::swept(volume.min_spacing());
 //! let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, cao::renderer::COLOUR)?;
 //!
 //! // A ball of 20 mm is cut out of one corner. In a loop over frames: move it, update, draw.

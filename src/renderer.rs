@@ -56,6 +56,15 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// Line sweeps, 26 weighted rays of 20 voxels, only needed voxels: what to use where the paper's numbers are not the point.
+    pub fn swept(min_spacing: f64) -> Self {
+        let mut setup = Self::paper(min_spacing);
+        setup.method = Method::Sweep;
+        setup.occlusion.rays = Method::Sweep.rays();
+        setup.occlusion.quadrature = Method::Sweep.quadrature();
+        setup
+    }
+
     /// The paper's settings (CAO §4), contextual updates, only needed voxels.
     pub fn paper(min_spacing: f64) -> Self {
         Self {

@@ -20,12 +20,12 @@
 //!     scale = 40                       # or one number an axis: [40, 40, 20]
 //!
 //!     [occlusion]
-//!     method = "cao"                   # only what a clip changes is computed again; "lao": everything
-//!     rays = 26                        # 6 14 26 54, equal weights; "14w" "26w" "50w", weighted
-//!     quadrature = "left"              # left cell segment
+//!     method = "sweep"                 # lines of voxels, where opacities change; "cao": rays, where clips change; "lao": all rays
+//!     rays = "26w"                     # "6" "14w" "26w" "50w", weighted; 14 26 54, equal weights; default of cao and lao: 26
+//!     quadrature = "segment"           # left cell segment; sweeps: segment; default of cao and lao: left, the paper's sum
 //!     radius_mm = 20                   # default: 20 of the smallest spacing
 //!     offset_mm = 0.5                  # where rays start; default: half a step
-//!     step_mm = 1                      # default: the smallest spacing
+//!     step_mm = 1                      # default: the smallest spacing; of sweeps 1.75 times that, at most
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
@@ -152,6 +152,23 @@ impl Method {
         }
     }
 
+    /// The rays that it follows unless others are asked for: the paper's, or of a sweep those that cost it least for their accuracy
+    /// (README, the chart).
+    pub fn rays(self) -> RaySet {
+        match self {
+            Self::Lao | Self::Cao => RaySet::R26,
+            Self::Sweep => RaySet::W26,
+        }
+    }
+
+    /// The method for whom names none: sweeps, unless the rule that is asked for is none of theirs.
+    pub fn for_rule(quadrature: Option<Quadrature>) -> Self {
+        match quadrature {
+            Some(Quadrature::Left | Quadrature::Cell) => Self::Cao,
+            _ => Self::Sweep,
+        }
+    }
+
     /// Every method.
     pub const ALL: [Self; 3] = [Self::Lao, Self::Cao, Self::Sweep];
 
@@ -197,10 +214,10 @@ pub struct OcclusionSettings {
 impl Default for OcclusionSettings {
     fn default() -> Self {
         Self {
-            method: Method::Cao,
+            method: Method::Sweep,
             needed_only: true,
-            rays: RaySet::R26,
-            quadrature: Quadrature::Left,
+            rays: Method::Sweep.rays(),
+            quadrature: Method::Sweep.quadrature(),
             radius_mm: None,
             offset_mm: None,
             step_mm: None,
@@ -608,8 +625,12 @@ impl OcclusionFile {
     fn read(self) -> Result<OcclusionSettings> {
         let default = OcclusionSettings::default();
         let in_occlusion = |error| under("occlusion", error);
+        let quadrature =
+            self.quadrature.as_deref().map(Quadrature::parse).transpose().map_err(in_occlusion)?;
+        let method = self.method.as_deref().map(Method::parse).transpose().map_err(in_occlusion)?;
+        let method = method.unwrap_or(Method::for_rule(quadrature));
         let rays = match &self.rays {
-            None => default.rays,
+            None => method.rays(),
             // 26 and "26" are the same set.
             Some(Value::String(name)) => RaySet::parse(name).map_err(in_occlusion)?,
             Some(other) => RaySet::parse(&shown(other)).map_err(in_occlusion)?,
@@ -629,14 +650,11 @@ impl OcclusionFile {
         ] {
             length(key, value, zero)?;
         }
-        let method =
-            self.method.as_deref().map_or(Ok(default.method), Method::parse).map_err(in_occlusion)?;
-        let quadrature = self.quadrature.as_deref().map_or(Ok(method.quadrature()), Quadrature::parse);
         Ok(OcclusionSettings {
             method,
             needed_only,
             rays,
-            quadrature: quadrature.map_err(in_occlusion)?,
+            quadrature: quadrature.unwrap_or(method.quadrature()),
             radius_mm: self.radius_mm.map(|mm| mm as f32),
             offset_mm: self.offset_mm.map(|mm| mm as f32),
             step_mm: self.step_mm.map(|mm| mm as f32),

@@ -35,9 +35,9 @@ fn a_volume_is_enough() {
     let occlusion = scene.occlusion.resolve(0.5).unwrap();
     assert_eq!(
         (occlusion.radius_mm, occlusion.rays, occlusion.quadrature),
-        (10.0, RaySet::R26, Quadrature::Left)
+        (10.0, RaySet::W26, Quadrature::Segment)
     );
-    assert_eq!((scene.occlusion.method, scene.occlusion.needed_only), (Method::Cao, true));
+    assert_eq!((scene.occlusion.method, scene.occlusion.needed_only), (Method::Sweep, true));
     // Every face of the volume is seen at its middle, by both eyes.
     for view in scene.stereo.rig([16.0; 3]).views(1.0, 0.1, 1e3).unwrap() {
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
@@ -46,6 +46,21 @@ fn a_volume_is_enough() {
                 assert!(uv.min_element() > 0.0 && uv.max_element() < 1.0, "{face}: {uv}");
             }
         }
+    }
+}
+
+/// What a scene leaves open follows from what it says: a rule of the paper asks for rays, and these for the paper's set.
+#[test]
+fn method_rule_and_rays_follow_from_each_other() {
+    for (text, expected) in [
+        ("method = \"cao\"", (Method::Cao, RaySet::R26, Quadrature::Left)),
+        ("quadrature = \"cell\"", (Method::Cao, RaySet::R26, Quadrature::Cell)),
+        ("quadrature = \"segment\"", (Method::Sweep, RaySet::W26, Quadrature::Segment)),
+        ("rays = 26", (Method::Sweep, RaySet::R26, Quadrature::Segment)),
+        ("method = \"lao\"\nquadrature = \"segment\"", (Method::Lao, RaySet::R26, Quadrature::Segment)),
+    ] {
+        let found = with(&format!("[occlusion]\n{text}")).occlusion;
+        assert_eq!((found.method, found.rays, found.quadrature), expected, "{text}");
     }
 }
 
@@ -245,7 +260,7 @@ fn impossible_values_are_refused_by_name() {
         ("[occlusion]\nrays = 7", "occlusion.rays: \"7\" is no ray set"),
         ("[occlusion]\nrays = [26]", "occlusion.rays: "),
         ("[occlusion]\nquadrature = \"simpson\"", "occlusion.quadrature: \"simpson\" is no rule"),
-        ("[occlusion]\nmethod = \"ssao\"", "occlusion.method: \"ssao\": expected lao or cao"),
+        ("[occlusion]\nmethod = \"ssao\"", "occlusion.method: \"ssao\": expected lao, cao, sweep"),
         ("[occlusion]\nscope = \"some\"", "occlusion.scope: \"some\": expected needed or all"),
         ("[stereo]\nipd_mm = -1", "stereo.ipd_mm: -1: expected a length >= 0 mm"),
         ("[stereo]\nscreen_mm = 0", "stereo.screen_mm: 0: expected a length > 0 mm"),

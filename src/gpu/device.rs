@@ -282,6 +282,11 @@ impl Gpu {
         feature::filters(&self.0.instance, self.0.physical, format.vk())
     }
 
+    /// Whether kernels can read and write images of this format.
+    pub fn stores(&self, format: Format) -> bool {
+        feature::stores(&self.0.instance, self.0.physical, format.vk())
+    }
+
     /// Messages of the validation layer so far; empty without validation.
     pub fn validation_messages(&self) -> Vec<String> {
         self.0.log.messages()

@@ -107,7 +107,8 @@ const FILTERED: vk::FormatFeatureFlags =
 const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
 const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
 
-/// Required uses of formats. `R16_UNORM`, filtered, is optional: 16-bit values become f32 texels without it (`Gpu::filters`).
+/// Required uses of formats. `R16_UNORM` is optional: not filtered, 16-bit values become f32 texels (`Gpu::filters`); not
+/// filtered and stored, there are no sweeps (`Gpu::stores`).
 pub const FORMATS: &[FormatNeed] = &[
     FormatNeed {
         format: vk::Format::R32_SFLOAT,
@@ -129,6 +130,13 @@ pub(crate) fn filters(instance: &ash::Instance, device: vk::PhysicalDevice, form
     // SAFETY: `device` was enumerated from `instance`.
     let has = unsafe { instance.get_physical_device_format_properties(device, format) };
     has.optimal_tiling_features.contains(FILTERED)
+}
+
+/// Whether images of this format, with optimal tiling, can be read and written by kernels.
+pub(crate) fn stores(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
+    // SAFETY: `device` was enumerated from `instance`.
+    let has = unsafe { instance.get_physical_device_format_properties(device, format) };
+    has.optimal_tiling_features.contains(STORAGE)
 }
 
 /// Everything that this device lacks, in words; empty for a usable one.

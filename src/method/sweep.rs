@@ -4,7 +4,6 @@
 //!
 //! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, and some 36 bytes a brick of 512.
 
-use crate::Result;
 use crate::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Recorder, Timings};
 use crate::method::volumes::volume_image;
 use crate::occlusion::Occlusion;
@@ -19,6 +18,7 @@ use crate::stage::near::{self, FAR, Near};
 use crate::stage::sweep::{Sweep, SweepPlan};
 use crate::stage::sweep_list::{SweepList, SweepLists};
 use crate::stage::transfer::TransferBuffer;
+use crate::{Error, Result};
 
 /// Device memory of one scene, beside the volume itself.
 pub struct SweptVolumes {
@@ -50,6 +50,13 @@ impl SweptVolumes {
     /// # Errors
     /// As [`SweepPlan::new`], and those of the device.
     pub fn new(gpu: &Gpu, field: &Field, occlusion: &Occlusion, scope: Scope) -> Result<Self> {
+        if !(gpu.stores(Format::R16Unorm) && gpu.filters(Format::R16Unorm)) {
+            return Err(Error::Device {
+                problem:
+                    "has no filtered storage images of R16_UNORM, which sweeps need; choose method cao or lao"
+                        .into(),
+            });
+        }
         let plan = plan(field, occlusion)?;
         let bricks = 4 * u64::from(field.brick_count());
         let brick_buffer = |name| gpu.buffer(name, bricks, BufferUse::Device);

@@ -181,7 +181,7 @@ pub struct Render {
     #[command(flatten)]
     pub budget: Budget,
     /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
-    /// comparison [default: cao]
+    /// comparison [default: sweep; cao where --quadrature is left or cell]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
     pub method: Option<Method>,
     #[command(flatten)]

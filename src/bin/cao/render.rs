@@ -97,10 +97,20 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
 fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Result<()> {
     let s = &args.settings;
     let o = &mut scene.occlusion;
-    o.rays = s.rays.unwrap_or(o.rays);
-    if let Some(method) = args.method.filter(|method| *method != o.method) {
+    // A rule that sweeps do not have asks for another method.
+    let by_rule = || s.quadrature.map(|rule| Method::for_rule(Some(rule))).filter(|m| *m != Method::Sweep);
+    let method = match (args.method, o.method) {
+        (None, Method::Sweep) => by_rule().unwrap_or(Method::Sweep),
+        (asked, own) => asked.unwrap_or(own),
+    };
+    if method != o.method {
+        // What the scene left to its method is left to this one.
+        if o.rays == o.method.rays() {
+            o.rays = method.rays();
+        }
         (o.method, o.quadrature) = (method, method.quadrature());
     }
+    o.rays = s.rays.unwrap_or(o.rays);
     o.quadrature = s.quadrature.unwrap_or(o.quadrature);
     o.radius_mm = s.radius_mm.or(o.radius_mm);
     o.offset_mm = s.offset_mm.or(o.offset_mm);

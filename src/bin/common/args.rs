@@ -62,7 +62,7 @@ pub struct Settings {
     /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
     #[arg(long, value_name = "FILE|PRESET")]
     pub transfer: Option<String>,
-    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26]
+    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26; of sweeps 26w]
     #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
     pub rays: Option<RaySet>,
     /// Rule along a ray: left (the paper's sum), cell, segment [default: left; of sweeps segment, their only one]
@@ -125,7 +125,7 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     setup.method = method;
     setup.scope = if all { Scope::All } else { Scope::Needed };
     let occlusion = &mut setup.occlusion;
-    occlusion.rays = settings.rays.unwrap_or(occlusion.rays);
+    occlusion.rays = settings.rays.unwrap_or(method.rays());
     occlusion.quadrature = settings.quadrature.unwrap_or(method.quadrature());
     occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
     occlusion.offset_mm = settings.offset_mm;

@@ -11,6 +11,7 @@ mod lao;
 mod lao_unit;
 mod rendered;
 mod solid;
+mod sweep;
 
 use crate::Result;
 use crate::clip::Clip;
@@ -23,13 +24,14 @@ use crate::view::View;
 use crate::volume::Volume;
 
 /// Every method, in the order of the legend.
-const METHODS: [fn(&Asked) -> Vec<Entry>; 6] = [
+const METHODS: [fn(&Asked) -> Vec<Entry>; 7] = [
     solid::entries,
     image_space::entries,
     lao_unit::entries,
     lao::entries,
     cao_literal::entries,
     cao::entries,
+    sweep::entries,
 ];
 
 /// Name of the method that times are quoted against: the paper's naive recomputation (method.md §2).
