@@ -13,7 +13,7 @@ use crate::gpu::{
 };
 use crate::method::sweep::{self, Edit, SweepKernels, SweptVolumes};
 use crate::method::trial::Trial;
-use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
+use crate::method::volumes::{Kernels, Settings, Volumes, read_texels, read_values, volume_image};
 use crate::method::{cao, lao};
 use crate::occlusion::Occlusion;
 use crate::scene::Method;
@@ -719,7 +719,7 @@ impl Renderer {
         rec.submit_and_wait()?;
         self.stale = Stale::ALL;
         let opacity = self.held.opacity();
-        let values = self.texel_values(opacity)?;
+        let values = read_values(&self.gpu, opacity)?;
         let settings = self.settings();
         let trial = Trial::new(&self.gpu, &self.field, opacity, settings.scope, settings.reference_mm)?;
         Ok((trial, values))
@@ -755,21 +755,23 @@ impl Renderer {
 
     /// V_AO, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_ambient(&self) -> Result<Vec<f32>> {
-        self.read_values(self.held.ambient())
+        self.current()?;
+        read_values(&self.gpu, self.held.ambient())
     }
 
     /// V_o after clipping, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_opacity(&self) -> Result<Vec<f32>> {
-        self.read_values(self.held.opacity())
+        self.current()?;
+        read_values(&self.gpu, self.held.opacity())
     }
 
     /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of a sweep 1 in the bricks that the last update computed and 2
     /// elsewhere. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_mask(&self) -> Result<Vec<u8>> {
+        self.current()?;
         match &self.held {
-            Held::Cast(cast) => self.read_volume(&cast.1.mask),
+            Held::Cast(cast) => read_texels(&self.gpu, &cast.1.mask),
             Held::Swept(swept) => {
-                self.current()?;
                 let todo: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read_buffer(&swept.1.todo)?);
                 let ([x, y, z], [bx, by, _]) = (self.field.dims, self.field.bricks());
                 let mut mask = Vec::with_capacity((x * y * z) as usize);
@@ -792,49 +794,6 @@ impl Renderer {
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
         read_back.read(0, buffer.bytes())
-    }
-
-    /// What the texels of a volume stand for.
-    fn read_values(&self, image: &Image) -> Result<Vec<f32>> {
-        self.current()?;
-        self.texel_values(image)
-    }
-
-    fn texel_values(&self, image: &Image) -> Result<Vec<f32>> {
-        let texels = self.read_texels(image)?;
-        Ok(match image.desc().format {
-            Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&texels)
-                .into_iter()
-                .map(|texel| f32::from(texel) / 65535.0)
-                .collect(),
-            _ => bytemuck::pod_collect_to_vec(&texels),
-        })
-    }
-
-    fn read_volume(&self, image: &Image) -> Result<Vec<u8>> {
-        self.current()?;
-        self.read_texels(image)
-    }
-
-    /// Texels of a volume, slices at a time so that no buffer exceeds a device's limits.
-    fn read_texels(&self, image: &Image) -> Result<Vec<u8>> {
-        let [x, y, z] = self.field.dims;
-        let slice = u64::from(x) * u64::from(y) * image.desc().format.bytes();
-        let slices = ((64 << 20) / slice).clamp(1, u64::from(z)) as u32;
-        let read_back =
-            self.gpu.buffer("volume read-back", slice * u64::from(slices), BufferUse::Readback)?;
-        let mut all = Vec::with_capacity((slice * u64::from(z)) as usize);
-        let mut first = 0;
-        while first < z {
-            let count = slices.min(z - first);
-            let mut rec = self.gpu.recorder("read volume")?;
-            rec.copy_image_to_buffer(image, 0, [0, 0, first], [x, y, count], &read_back, 0)?;
-            rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-            rec.submit_and_wait()?;
-            all.extend(read_back.read(0, slice * u64::from(count))?);
-            first += count;
-        }
-        Ok(all)
     }
 
     /// The device.

@@ -3,7 +3,7 @@
 //!
 //! * [`ambient`]: the integral that ambient occlusion stands for, at the voxels that count;
 //! * [`literal`]: what the paper's sum converges to with ever more rays;
-//! * [`image`]: the picture with ambient occlusion evaluated at every sample of its rays instead of read from a volume.
+//! * [`image()`]: the picture with ambient occlusion evaluated at every sample of its rays instead of read from a volume.
 
 use super::error::{Errors, counting, errors};
 use super::random::Random;
