@@ -349,6 +349,52 @@ fn volumes_are_drawn_with_flags_alone_also_negative_ones_and_the_smallest() {
     }
 }
 
+/// What is chosen is what is computed, within what the flags leave open, and both budgets refuse the impossible.
+#[test]
+fn a_budget_chooses_among_what_the_flags_leave_open_and_says_what_it_measured() {
+    let folder = Folder::with_device();
+    let scene = "occlusion builtin:engine:24 --radius-mm 5 --needed-only --clip sphere --clip-scale 8";
+    for (limits, budget, tried) in [
+        ("--method lao --rays 26w", "--budget-error 0.5", 3),
+        ("--rays 14w --quadrature segment", "--budget-ms 1e5", 2),
+        ("--method sweep", "--budget-error 0.5", 4),
+    ] {
+        let answer = folder.json(&format!("{scene} {limits} {budget} -o chosen.nrrd"));
+        let planned = &answer["planned"];
+        assert_eq!(planned["settings_tried"], tried, "{limits}: {answer}");
+        let number = |key: &str| planned[key].as_f64().unwrap();
+        assert!(number("error") <= number("error_bound") && number("error_bound") < 0.5, "{answer}");
+        assert!(
+            number("foreseen_ms") > 0.0 && number("sample_bricks") <= number("needed_bricks"),
+            "{answer}"
+        );
+        let [method, rays, rule] = ["method", "rays", "quadrature"].map(|key| answer[key].as_str().unwrap());
+        for (flag, value) in limits.split_whitespace().zip(limits.split_whitespace().skip(1)).step_by(2) {
+            assert_eq!(answer[flag.trim_start_matches('-')], value, "{answer}");
+        }
+        let chosen = format!("--method {method} --rays {rays} --quadrature {rule}");
+        folder.json(&format!("{scene} {chosen} -o said.nrrd"));
+        let [chosen, said] =
+            ["chosen.nrrd", "said.nrrd"].map(|name| bits(&values(&written(&folder, name, [24; 3]))));
+        assert!(chosen == said, "{limits}");
+    }
+    for (budget, parts) in [
+        ("--budget-error 1e-9", ["error budget", "most accurate"]),
+        ("--budget-ms 1e-9", ["time budget", "quickest"]),
+    ] {
+        let run = folder.run(&format!("render builtin:engine:16 --radius-mm 3 {budget} -o s.png"));
+        assert_eq!(run.code, Some(1), "{}", run.err);
+        assert!(
+            parts.iter().all(|part| run.err.contains(part)) && run.err.contains("ask for"),
+            "{}",
+            run.err
+        );
+    }
+    // People read the same.
+    let text = folder.ok("render builtin:engine:16 --radius-mm 3 --budget-error 0.9 --size 8x8 -o s.png");
+    assert!(text.contains("planned   method") && text.contains("settings tried on"), "{text}");
+}
+
 #[test]
 fn devices_are_listed_with_their_number() {
     let folder = Folder::with_device();
@@ -408,9 +454,10 @@ fn help_names_every_command_flag_and_default() {
     }
     let shared = "--transfer --rays --quadrature --radius-mm --dims --type --spacing --json --device";
     let clips = "--method --clip --clip-mode --clip-translate --clip-rotate --clip-scale --output";
+    let budgets = "--budget-error --budget-ms";
     for (command, flags) in [
-        ("occlusion", format!("{shared} {clips} --opacity-out --mask-out")),
-        ("render", format!("{shared} {clips} --eyes --size")),
+        ("occlusion", format!("{shared} {clips} {budgets} --opacity-out --mask-out")),
+        ("render", format!("{shared} {clips} {budgets} --eyes --size")),
         ("verify", format!("{shared} --poses --seed")),
     ] {
         let help = folder.ok(&format!("{command} --help"));

@@ -200,7 +200,7 @@ fn swept(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
 }
 
 /// A sweep of this many ms is not timed again.
-const LONG_ENOUGH_MS: f64 = 200.0;
+const LONG_ENOUGH_MS: f64 = 20.0;
 
 impl Calibration {
     /// The candidate to take.
