@@ -109,9 +109,10 @@ fn ray_segment(start: vec3<f32>, direction: vec3<f32>) -> f32 {
         }
         let near = max(q0, 0.0);
         let far = max(q1, 0.0);
-        let depth = mean_extinction(near, entropy(near), far, entropy(far)) * length * params.exponent;
-        sum += length * before * mean_transmittance(depth);
-        before *= exp(-depth);
+        let depth = mean_extinction(near, logarithm(near), far, logarithm(far)) * length * params.exponent;
+        let through = exp(-depth);
+        sum += length * before * mean_transmittance(depth, through);
+        before *= through;
         if m < params.samples {
             q0 = q1;
             q1 = 1.0 - opacity_at(start + (params.first + f32(m) * params.step) * direction);

@@ -1,8 +1,13 @@
-// Line sweep: local ambient occlusion along one lattice direction for every voxel, at a cost that does not depend on the
-// radius (method.md section 4). All voxels of a lattice line share its segments; a voxel's ray is a window of consecutive
-// segments, each an affine pair (t, s): T' = t T, S' = S + s T. Windows by two scans (van Herk 1992, Gil and Werman 1993):
-// a line is cut into blocks as long as the window; a window is the suffix of one block and the prefix of the next. No
-// subtraction, and no value depends on samples outside its own window or on which other voxels are computed.
+// Line sweep: local ambient occlusion along one lattice direction and its reverse for every voxel, at a cost that hardly
+// depends on the radius (method.md section 4). All voxels of a lattice line share its segments; a voxel's ray is a segment
+// that begins at the start offset and a window of whole segments behind it, each an affine pair (t, s): T' = t T, S' = S + s T.
+//
+// Windows by scans of blocks (van Herk 1992, Gil and Werman 1993), on two levels so that all but a few numbers stay in
+// registers: a line is cut into chunks of a few segments. The windows that begin in one chunk are a suffix of it, then a middle
+// that they share, then a prefix of the chunk that lies one window further on. An invocation walks both chunks at once, `trail`
+// and `lead`; the middle is composed from whole chunks that `lead` has passed. Backwards the same three parts serve
+// the rays that end in `trail` and begin in `lead`. No subtraction, and no value depends on samples outside its own window or
+// on which other voxels are computed, for chunks are fixed in the line.
 //
 // Lines are walked along one axis, one voxel a step in every line, and wrap round along the other two: so lanes stay side by
 // side, all lines are equally long and together they meet each voxel once. Where a line leaves the volume (a gap) the window
@@ -14,8 +19,8 @@ struct SweepParams {
     axis: u32,
     // the lattice direction
     step: vec3<i32>,
-    // segments of a block, which is the window behind the first segment
-    block: u32,
+    // segments behind the first, at least 1
+    window: u32,
     bricks: vec3<u32>,
     // 1: the first direction, which begins the sum
     flags: u32,
@@ -29,7 +34,7 @@ struct SweepParams {
     depth: f32,
     // where the ray starts, as a share of the first segment
     start: f32,
-    // segments behind the first: `block`, or 0
+    // segments behind the first: `window`, or 0
     far: f32,
     // weight of the direction / length of the ray in segments
     share: f32,
@@ -43,22 +48,30 @@ struct Todo {
 #include "shared/sweep.wgsl"
 
 const FIRST = 1u;
-// Longest block.
+// Longest window.
 const MOST = 128u;
 // Both ends opaque: nothing comes through (lao.wgsl).
 const OPAQUE = 1e-6;
 
 var<immediate> params: SweepParams;
-@group(0) @binding(0) var opacity: texture_3d<f32>;
+// Read as a storage image: for one texel on a processor at half the cost of a sampled one.
+@group(0) @binding(0) var opacity: texture_storage_3d<r16unorm, read>;
 @group(0) @binding(1) var<storage, read> list: SweepList;
 @group(0) @binding(2) var<storage, read> todo: Todo;
 @group(0) @binding(3) var ambient: texture_storage_3d<r16unorm, read_write>;
+
+// Transmittance q and ln q.
+const FREE = vec2(1.0, 0.0);
+
+fn clear(q: f32) -> vec2<f32> {
+    return vec2(q, logarithm(q));
+}
 
 // Transmittance of a lattice point; 1 outside the volume.
 fn clear_at(p: vec3<i32>) -> f32 {
     let dims = vec3<i32>(params.dims);
     let held = clamp(p, vec3(0), dims - 1);
-    return 1.0 - select(0.0, textureLoad(opacity, held, 0).r, all(held == p));
+    return 1.0 - select(0.0, textureLoad(opacity, held).r, all(held == p));
 }
 
 fn clear_along_x(p: vec3<i32>, x: f32) -> f32 {
@@ -86,53 +99,136 @@ fn clear_between(p: vec3<i32>, offset: vec3<f32>) -> f32 {
 }
 
 // The affine pair of a piece of a segment; lengths in segments.
-fn pair_of(q0: f32, e0: f32, q1: f32, e1: f32, length: f32, depth: f32) -> vec2<f32> {
-    let x = mean_extinction(q0, e0, q1, e1) * depth;
-    let pair = vec2(exp(-x), length * mean_transmittance(x));
-    return select(pair, vec2(0.0), max(q0, q1) < OPAQUE);
+fn pair_of(a: vec2<f32>, b: vec2<f32>, length: f32, depth: f32) -> vec2<f32> {
+    let x = mean_extinction(a.x, a.y, b.x, b.y) * depth;
+    let t = exp(-x);
+    return select(vec2(t, length * mean_transmittance(x, t)), vec2(0.0), max(a.x, b.x) < OPAQUE);
 }
 
 fn compose(near: vec2<f32>, behind: vec2<f32>) -> vec2<f32> {
     return vec2(near.x * behind.x, near.y + near.x * behind.y);
 }
 
-// Pairs of the segment from p: whole, and from the ray's start on.
-struct Segment {
-    whole: vec2<f32>,
-    head: vec2<f32>,
+// The pair of what is left of a piece behind a share of it.
+fn pair_behind(share: f32, a: vec2<f32>, b: vec2<f32>, length: f32, depth: f32) -> vec2<f32> {
+    return pair_of(clear(mix(a.x, b.x, share)), b, (1.0 - share) * length, (1.0 - share) * depth);
 }
 
-fn segment(p: vec3<i32>, q0: f32, e0: f32, q1: f32, e1: f32) -> Segment {
-    var found = Segment(vec2(1.0, 0.0), vec2(1.0, 0.0));
-    let length = 1.0 / f32(params.pieces);
-    var qa = q0;
-    var ea = e0;
+// Pairs of one segment: whole, with its sum `back` from b to a, and from a ray's start at either end.
+struct Pairs {
+    whole: vec2<f32>,
+    back: f32,
+    head: vec2<f32>,
+    head_back: vec2<f32>,
+}
+
+// From the lattice point p to p + step.
+fn pairs_of(fine: bool, p: vec3<i32>, step: vec3<i32>, a: vec2<f32>, b: vec2<f32>) -> Pairs {
+    if !fine {
+        let whole = pair_of(a, b, 1.0, params.depth);
+        return Pairs(whole, whole.y, pair_behind(params.start, a, b, 1.0, params.depth),
+            pair_behind(params.start, b, a, 1.0, params.depth));
+    }
+    var found = Pairs(vec2(1.0, 0.0), 0.0, vec2(1.0, 0.0), vec2(1.0, 0.0));
+    let pieces = f32(params.pieces);
+    let length = 1.0 / pieces;
+    var near = a;
     for (var piece = 1u; piece <= params.pieces; piece++) {
-        var qb = q1;
-        var eb = e1;
+        var end = b;
         if piece < params.pieces {
-            qb = clear_between(p, vec3<f32>(params.step) * (f32(piece) * length));
-            eb = entropy(qb);
+            end = clear(clear_between(p, vec3<f32>(step) * (f32(piece) * length)));
         }
-        let pair = pair_of(qa, ea, qb, eb, length, params.depth);
+        let pair = pair_of(near, end, length, params.depth);
         found.whole = compose(found.whole, pair);
-        // The share of this piece that lies before the ray's start.
-        let before = params.start * f32(params.pieces) - f32(piece - 1u);
+        found.back = pair.y + pair.x * found.back;
+        // The share of this piece that lies before the ray's start, seen from either end.
+        let before = params.start * pieces - f32(piece - 1u);
         if before <= 0.0 {
             found.head = compose(found.head, pair);
         } else if before < 1.0 {
-            let qs = mix(qa, qb, before);
-            let rest = 1.0 - before;
-            found.head = pair_of(qs, entropy(qs), qb, eb, rest * length, rest * params.depth);
+            found.head = pair_behind(before, near, end, length, params.depth);
         }
-        qa = qb;
-        ea = eb;
+        let behind = params.start * pieces - f32(params.pieces - piece);
+        if behind <= 0.0 {
+            found.head_back = compose(pair, found.head_back);
+        } else if behind < 1.0 {
+            found.head_back = compose(pair_behind(behind, end, near, length, params.depth), found.head_back);
+        }
+        near = end;
     }
     return found;
 }
 
-fn outside(p: vec3<i32>) -> bool {
-    return any(p < vec3(0)) || any(p >= vec3<i32>(params.dims));
+// Consecutive segments, walked forwards and backwards: transmittance t up to the other end, which a gap makes 0, and a ray's
+// sum, s + n free where a gap lets it go on for n segments of free space; backwards the same.
+struct Link {
+    t: f32,
+    s: f32,
+    free: f32,
+    s_back: f32,
+    free_back: f32,
+}
+
+// `a` of length `a_length`, then `b`.
+fn join(a: Link, a_length: f32, b: Link, b_length: f32) -> Link {
+    return Link(
+        a.t * b.t,
+        a.s + a.t * b.s + a.free * b_length,
+        a.free + a.t * b.free,
+        b.s_back + b.t * a.s_back + b.free_back * a_length,
+        b.free_back + b.t * a.free_back,
+    );
+}
+
+const NOTHING = Link(1.0, 0.0, 0.0, 0.0, 0.0);
+
+struct Point {
+    p: vec3<i32>,
+    clear: vec2<f32>,
+}
+
+// From one voxel of a line to the next.
+struct Segment {
+    link: Link,
+    // t, s, free from the ray's start: forwards, backwards
+    head: vec3<f32>,
+    head_back: vec3<f32>,
+}
+
+fn segment(fine: bool, a: Point, b: Point, gap: bool) -> Segment {
+    let there = pairs_of(fine, a.p, params.step, a.clear, select(b.clear, FREE, gap));
+    if gap {
+        let back = pairs_of(fine, b.p, -params.step, b.clear, FREE);
+        return Segment(
+            Link(0.0, there.whole.y, there.whole.x, back.whole.y, back.whole.x),
+            vec3(0.0, there.head.yx),
+            vec3(0.0, back.head.yx),
+        );
+    }
+    return Segment(
+        Link(there.whole.x, there.whole.y, 0.0, there.back, 0.0),
+        vec3(there.head, 0.0),
+        vec3(there.head_back, 0.0),
+    );
+}
+
+fn point(p: vec3<i32>) -> Point {
+    return Point(p, clear(1.0 - textureLoad(opacity, p).r));
+}
+
+struct Step {
+    p: vec3<i32>,
+    // whether the line left the volume on the way
+    gap: bool,
+}
+
+// `advance` is the step without whole sizes of the volume.
+fn step_from(p: vec3<i32>, advance: vec3<i32>) -> Step {
+    let dims = vec3<i32>(params.dims);
+    let next = p + advance;
+    let left = vec3<u32>(next) >= params.dims;
+    let gap = any(left) || any(advance != params.step);
+    return Step(next - select(vec3(0), select(dims, -dims, params.step < vec3(0)), left), gap);
 }
 
 fn subtract(p: vec3<i32>, occluded: f32) {
@@ -147,9 +243,8 @@ fn subtract(p: vec3<i32>, occluded: f32) {
     textureStore(ambient, p, vec4(before - occluded, 0.0, 0.0, 0.0));
 }
 
-// One workgroup a run of blocks of a tile of 8x8 lines.
-@compute @workgroup_size(8, 8, 1)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+// One workgroup a run of chunks of a tile of 8x8 lines.
+fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
     let entry = group.x + group.y * GROUPS_PER_ROW;
     if entry >= list.head[params.list].count {
         return;
@@ -160,75 +255,112 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) l
     if any(line.xy >= line_extent(params.axis, dims)) {
         return;
     }
-    let block = i32(params.block);
     let steps = line_steps(line.z, params.axis, dims, params.step);
-    // Modulo the volume, for positions that wrap round.
-    let advance = wrapped(params.step, dims);
+    let advance = params.step % dims;
+    let window = i32(params.window);
+    let size = chunk_size(window);
+    // The middle: so many segments that are the last of their chunk, then so many whole chunks.
+    let whole = (window - size) / size;
+    let odd = window - size - whole * size;
+    let middle_length = f32(window - size);
+    // 0 where a ray is its head only.
+    let goes_on = min(params.far, 1.0);
+    let unobstructed = 2.0 * (params.far + 1.0 - params.start);
 
-    // The voxel whose ray's first window begins the run's first block, and its own segment.
-    var i = i32(run.first) * block - 1;
-    var trail = line_position(line, i, params.axis, dims, params.step);
-    var p = trail;
-    var q = clear_at(p);
-    var e = entropy(q);
-    var head = vec2(1.0, 0.0);
-    var head_gap = false;
-    // For each segment of a block: suffix pair, with the sign bit of t where a gap follows; head pair.
-    var slots: array<vec4<f32>, MOST>;
-    // Last slot of the block before that has a gap behind it.
-    var closed = -1;
-    let whole = params.far + (1.0 - params.start);
+    let first = i32(run.first) - chunk_lag(window);
+    let end = first + i32(run.count);
+    // What the first middle is composed of; before a line's first chunk there is a gap.
+    let begin = select(first - whole - 1, first, run.first == 0u);
 
-    for (var b = -1; b <= i32(run.count); b++) {
-        var prefix = vec2(1.0, 0.0);
-        var gap_in_prefix = false;
-        var last_gap = -1;
-        // Before the first block only the segment in front of it is wanted.
-        for (var t = select(0, block - 1, b < 0); t < block; t++) {
-            if b > 0 {
-                let old = slots[t];
-                // What lies behind the suffix: the prefix of this block, or free space behind a gap.
-                let behind = select(prefix, vec2(1.0, f32(t)), t <= closed);
-                let sum = select(old.y + abs(old.x) * behind.y, params.far, head_gap);
-                let through = head.y + head.x * select(sum, 0.0, params.far == 0.0);
-                if i >= 0 && i < steps {
-                    subtract(trail, max(params.share * (whole - through), 0.0));
+    // Of the last 16 chunks of `lead`: all, and the `odd` last segments.
+    var chunks: array<Link, 16>;
+    var odds: array<Link, 16>;
+    // Sums of rays backwards, until their voxels have those forwards.
+    var backwards: array<f32, MOST + 1>;
+    var place = 0;
+
+    var lead = point(line_position(line, begin * size + window, params.axis, dims, params.step));
+    var trail = point(line_position(line, first * size, params.axis, dims, params.step));
+    var voxel = trail.p;
+    for (var c = begin; c < end; c++) {
+        // Of each place in `trail`: the ray's t, s, free from its start to the chunk's end; the sum back from there.
+        var suffixes: array<vec3<f32>, CHUNK>;
+        var suffixes_back: array<f32, CHUNK>;
+        var middle = odds[u32(c - whole - 1) % 16u];
+        if c >= first {
+            var links: array<Link, CHUNK>;
+            for (var i = 0; i < CHUNK; i++) {
+                if i < size {
+                    let next = step_from(trail.p, advance);
+                    let to = point(next.p);
+                    let found = segment(fine, trail, to, next.gap);
+                    links[i] = found.link;
+                    suffixes[i] = found.head * vec3(goes_on, 1.0, goes_on);
+                    trail = to;
                 }
-                i++;
-                trail += advance;
-                trail -= select(vec3(0), dims, trail >= dims);
-                head = old.zw;
-                head_gap = (bitcast<u32>(old.x) >> 31u) == 1u;
             }
-            let gap = outside(p + params.step);
-            var next = p + advance;
-            next -= select(vec3(0), dims, next >= dims);
-            let q_next = 1.0 - textureLoad(opacity, next, 0).r;
-            let e_next = entropy(q_next);
-            let found = segment(p, q, e, select(q_next, 1.0, gap), select(e_next, 0.0, gap));
-            slots[t] = vec4(select(found.whole.x, -found.whole.x, gap), found.whole.y, found.head);
-            prefix = compose(prefix, select(found.whole, vec2(1.0, 1.0), gap_in_prefix));
-            if gap {
-                gap_in_prefix = true;
-                last_gap = t;
+            var suffix = NOTHING;
+            for (var k = 0; k < CHUNK; k++) {
+                let i = CHUNK - 1 - k;
+                if i < size {
+                    let length = f32(size - 1 - i);
+                    let head = suffixes[i];
+                    suffixes[i] = vec3(
+                        head.x * suffix.t,
+                        head.y + head.x * suffix.s + head.z * length,
+                        head.z + head.x * suffix.free,
+                    );
+                    suffix = join(links[i], 1.0, suffix, length);
+                    suffixes_back[i] = suffix.s_back;
+                }
             }
-            p = next;
-            q = q_next;
-            e = e_next;
+            var length = f32(odd);
+            for (var k = c - whole; k < c; k++) {
+                middle = join(middle, length, chunks[u32(k) % 16u], f32(size));
+                length += f32(size);
+            }
         }
-        if b < 0 {
-            let own = slots[block - 1];
-            head = own.zw;
-            head_gap = (bitcast<u32>(own.x) >> 31u) == 1u;
-            continue;
+        var chunk = NOTHING;
+        var last = NOTHING;
+        for (var i = 0; i < CHUNK; i++) {
+            if i < size {
+                let next = step_from(lead.p, advance);
+                let to = point(next.p);
+                let found = segment(fine, lead, to, next.gap);
+                lead = to;
+                let head = found.head_back;
+                let rest = middle.s_back + middle.t * suffixes_back[i] + middle.free_back * f32(size - i);
+                let back = head.y + head.x * goes_on * rest + head.z * params.far;
+                middle = join(middle, middle_length + f32(i), found.link, 1.0);
+                chunk = join(chunk, f32(i), found.link, 1.0);
+                if i >= size - odd {
+                    last = join(last, f32(i - (size - odd)), found.link, 1.0);
+                }
+                if c >= first {
+                    let suffix = suffixes[i];
+                    let sum = suffix.y + suffix.x * middle.s + suffix.z * (middle_length + f32(i + 1));
+                    let at = c * size + i;
+                    if at >= 0 && at < steps {
+                        subtract(voxel, max(params.share * (unobstructed - sum - backwards[place]), 0.0));
+                    }
+                    voxel = step_from(voxel, advance).p;
+                    backwards[place] = back;
+                    place = select(place + 1, 0, place == window);
+                }
+            }
         }
-        closed = last_gap;
-        var suffix = vec2(1.0, 0.0);
-        for (var t = block - 1; t >= 0; t--) {
-            let own = slots[t];
-            let gap = (bitcast<u32>(own.x) >> 31u) == 1u;
-            suffix = compose(vec2(abs(own.x), own.y), select(suffix, vec2(1.0, f32(block - 1 - t)), gap));
-            slots[t] = vec4(select(suffix.x, -suffix.x, gap), suffix.y, own.zw);
-        }
+        chunks[u32(c) % 16u] = chunk;
+        odds[u32(c) % 16u] = last;
     }
+}
+
+@compute @workgroup_size(8, 8, 1)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    walk(false, group, local);
+}
+
+// Segments of more than one piece.
+@compute @workgroup_size(8, 8, 1)
+fn pieces(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    walk(true, group, local);
 }

@@ -1,10 +1,9 @@
-// Compaction for a sweep (method.md section 4, sparse sweeps): for every direction and tile of lines the runs of blocks in
-// which some voxel is to be computed, so that nothing is walked elsewhere. Blocks are fixed in the lattice, so what a voxel's
-// value is does not depend on what is listed.
+// Compaction for a sweep (method.md section 4, sparse sweeps): for every direction and tile of lines the runs of chunks in
+// which some voxel is to be computed, and those in which its ray backwards is found, so that nothing is walked elsewhere.
+// Chunks are fixed in the lattice, so what a voxel's value is does not depend on what is listed.
 
 struct ListParams {
     dims: vec3<u32>,
-    directions: u32,
     bricks: vec3<u32>,
 }
 
@@ -14,7 +13,7 @@ struct Direction {
     tiles: vec2<u32>,
     // tiles in all layers
     count: u32,
-    block: u32,
+    window: u32,
 }
 
 struct Directions {
@@ -74,14 +73,15 @@ fn any_todo(low: vec2<i32>, high: vec2<i32>, slab: i32, axis: u32, dims: vec3<i3
     return false;
 }
 
-// Whether a voxel whose first window begins in block b is to be computed; conservative by the tile's bounding boxes.
-fn wanted(line: vec3<i32>, b: i32, steps: i32, d: Direction, dims: vec3<i32>) -> bool {
+// Whether a voxel of chunk c is to be computed; conservative by the tile's bounding boxes.
+fn wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i32>) -> bool {
     let across = line_axes(d.axis);
     let slope = vec2(d.step[across.x], d.step[across.y]);
     let stride = d.step[d.axis];
     let width = min(vec2(i32(TILE)), line_extent(d.axis, dims) - line.xy) - 1;
-    var i = max(b * i32(d.block) - 1, 0);
-    let last = min((b + 1) * i32(d.block) - 2, steps - 1);
+    let size = chunk_size(i32(d.window));
+    var i = c * size;
+    let last = min(i + size, steps) - 1;
     while i <= last {
         // Steps i ... j are in the same layer of bricks.
         let a = select(line.z, dims[d.axis] - 1 - line.z, stride < 0) + i * stride;
@@ -107,18 +107,24 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let dims = vec3<i32>(params.dims);
     let line = line_at(id.x, vec2(0u), d.tiles, d.axis, dims);
     let steps = line_steps(line.z, d.axis, dims, d.step);
-    let blocks = steps / i32(d.block) + 1;
+    let size = chunk_size(i32(d.window));
+    let lag = chunk_lag(i32(d.window));
+    let chunks = (steps + size - 1) / size;
+    // The run that is open: from its first chunk to before `end`.
     var first = 0;
-    for (var b = 0; b <= blocks; b++) {
-        if b < blocks && wanted(line, b, steps, d, dims) {
-            continue;
-        }
-        if b > first {
+    var end = 0;
+    for (var c = 0; c <= chunks; c++) {
+        let more = c < chunks && wanted(line, c, steps, d, dims);
+        if end > first && (c == chunks || (more && c > end)) {
             let slot = atomicAdd(&list.head[id.y].count, 1u);
-            list.runs[list.head[id.y].at + slot] = Run(id.x, u32(first), u32(b - first));
+            list.runs[list.head[id.y].at + slot] = Run(id.x, u32(first), u32(end - first));
             atomicMax(&list.head[id.y].groups_x, min(slot + 1u, GROUPS_PER_ROW));
             atomicMax(&list.head[id.y].groups_y, slot / GROUPS_PER_ROW + 1u);
+            end = first;
         }
-        first = b + 1;
+        if more {
+            first = select(c, first, end > first);
+            end = c + lag + 1;
+        }
     }
 }

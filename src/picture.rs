@@ -38,8 +38,8 @@ impl Picture {
         }
     }
 
-    /// Writes a PNG; nothing is left behind on failure.
-    pub fn write_png(&self, path: &Path) -> Result<()> {
+    /// The picture as a PNG file.
+    pub fn png(&self) -> Result<Vec<u8>> {
         let mut png = std::io::Cursor::new(Vec::new());
         let bytes = self.pixels.as_flattened();
         image::write_buffer_with_format(
@@ -51,7 +51,13 @@ impl Picture {
             image::ImageFormat::Png,
         )
         .map_err(|e| Error::Config { what: "picture".into(), problem: e.to_string() })?;
-        write_atomic(path, |file| file.write_all(png.get_ref()))
+        Ok(png.into_inner())
+    }
+
+    /// Writes a PNG; nothing is left behind on failure.
+    pub fn write_png(&self, path: &Path) -> Result<()> {
+        let png = self.png()?;
+        write_atomic(path, |file| file.write_all(&png))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::gpu::{
     Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder, Timings,
 };
 use crate::method::sweep::{self, Edit, SweepKernels, SweptVolumes};
+use crate::method::trial::Trial;
 use crate::method::volumes::{Kernels, Settings, Volumes, read_texels, read_values, volume_image};
 use crate::method::{cao, lao};
 use crate::occlusion::Occlusion;
@@ -691,6 +692,37 @@ impl Renderer {
             }
         };
         Ok((difference, timings))
+    }
+
+    /// Brings V_o up to date and lends it to trials of other rays; also returns it, x fastest. V_AO goes out of date: the next
+    /// update computes everything. Uses the device's queue and waits for it.
+    pub fn trial(&mut self) -> Result<(Trial<'_>, Vec<f32>)> {
+        let mut rec = self.gpu.recorder("opacity")?;
+        match &self.held {
+            Held::Cast(cast) => {
+                self.record_opacity(&mut rec, &cast.0, &cast.1)?;
+                self.record_clips(&mut rec, &cast.0, &cast.1)?;
+            }
+            Held::Swept(swept) => {
+                let (kernels, volumes) = &**swept;
+                if self.stale.opacity {
+                    self.record_transfer(&mut rec)?;
+                    self.record_occupancy(&mut rec)?;
+                }
+                self.clip_set.record(&mut rec, &self.clips, self.half_diagonal())?;
+                let (transfer, clips) = (&self.transfer_buffer, &self.clip_set);
+                let edit = self.edit();
+                sweep::record_choice(&mut rec, &self.field, kernels, volumes, transfer, clips, &edit)?;
+                rec.barrier(&[Access::StorageWrite], &[Access::TransferRead, Access::SampledRead]);
+            }
+        }
+        rec.submit_and_wait()?;
+        self.stale = Stale::ALL;
+        let opacity = self.held.opacity();
+        let values = read_values(&self.gpu, opacity)?;
+        let settings = self.settings();
+        let trial = Trial::new(&self.gpu, &self.field, opacity, settings.scope, settings.reference_mm)?;
+        Ok((trial, values))
     }
 
     /// What the left and the right eye read at world points in mm, in the order given. Refuses while the ambient volume is out of date.

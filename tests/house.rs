@@ -69,10 +69,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
 const ROOT_NAMES: [(&str, &str); 3] = [("Error", "error"), ("Result", "error"), ("layout_check", "gpu")];
 
 /// Other crates that only some places may name.
-const ONLY_IN: [(&str, &[&str]); 6] = [
+const ONLY_IN: [(&str, &[&str]); 7] = [
     ("ash", &["gpu/", "error.rs"]),
     ("gpu_allocator", &["gpu/"]),
     ("tobj", &["mesh.rs"]),
+    ("kuva", &["measure/plot.rs"]),
     ("clap", &["bin/"]),
     ("anyhow", &["bin/"]),
     ("indicatif", &["bin/"]),

@@ -37,7 +37,7 @@ const SIZE: [u32; 2] = [47, 41];
 
 /// What a colour component (0 ... about 1) of a pixel may be off by. The kernel snaps positions in V_AO to 1/256 voxel, over
 /// which a factor shown twice over changes by up to 2 · √3/512; the opacities of some hundred samples round to f32 and
-/// end the ray one sample earlier or later, at 1 − 0.99 of the light.
+/// end the ray one sample earlier or later, at less than 1/100 of the light.
 const COLOUR_TOLERANCE: f32 = 2.0 * 0.0034 + 0.01;
 
 /// The same for Vulkan depth, which ranges over 0 ... 1 between near and far: one sample earlier or later.
@@ -640,5 +640,73 @@ fn a_wrong_distance_is_caught() {
         }
     }
     assert!(too_far > 100 && no_cut > 10 && not_asked > 100, "{too_far} {no_cut} {not_asked}");
+    close(gpu);
+}
+
+/// sRGB level (0 ... 255, not rounded) of a premultiplied linear component over a background.
+fn level(component: f32, alpha: f32, background: f32) -> f32 {
+    let linear = (component + (1.0 - alpha) * background).clamp(0.0, 1.0);
+    let coded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    255.0 * coded
+}
+
+/// Rounding of the sums of some hundred f32 samples, in levels: 2^-24 each, spread by the slope of sRGB coding at 0.
+const LEVEL_ROUNDING: f32 = 100.0 * 255.0 * 12.92 * 6e-8;
+
+/// A ray that ends early shows, to half a level of an 8-bit picture over any background, what the whole ray shows; a tolerance of
+/// several levels does not, so that the comparison can tell.
+#[test]
+fn a_ray_that_ends_early_changes_no_pixel_by_more_than_half_a_level() {
+    let gpu = open();
+    let volume = in_floats(&builtin_box("engine", [32, 30, 31], [1.0; 3]).unwrap());
+    let (low, high) = volume.range();
+    let at = |share: f64| (low + share * (high - low)) as f32;
+    let white = vec![[0.0, 1.0, 1.0, 1.0]];
+    // The last is dark all the way to a bright end, where sRGB coding is steepest and most is still to come.
+    let dark = vec![[at(0.2), 0.0, 0.0, 0.0], [at(0.6), 1e-4, 2e-4, 1e-4], [at(1.0), 1.0, 1.0, 1.0]];
+    let steep = vec![[at(0.2), 0.0], [at(0.3), 0.9]];
+    let faint = vec![[at(0.1), 0.0], [at(0.4), 0.35]];
+    let (mut ended, mut loose) = (0, 0.0_f32);
+    for (opacity, colour) in
+        [(steep.clone(), white.clone()), (faint.clone(), white), (steep, dark.clone()), (faint, dark)]
+    {
+        let transfer = TransferFunction::new(opacity, colour, None).unwrap();
+        let mut renderer = Renderer::new(&gpu, &volume, transfer, setup(MAPS), COLOUR).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+        for turn in 0..3 {
+            let views = framing(&volume, 70.0 * turn as f32, 35.0 - 30.0 * turn as f32);
+            let draw = |tolerance| {
+                let look = Look { tolerance, occluded: turn != 2, step_mm: Some(0.3), ..Look::default() };
+                renderer.draw(&views, &look, SIZE).unwrap().0
+            };
+            let whole = draw(0.0);
+            let worst = |image: &StereoImage| {
+                let mut worst = 0.0_f32;
+                for (a, b) in image.colour.iter().flatten().zip(whole.colour.iter().flatten()) {
+                    for background in [0.0, 0.5, 1.0] {
+                        for c in 0..3 {
+                            worst = worst
+                                .max((level(a[c], a[3], background) - level(b[c], b[3], background)).abs());
+                        }
+                    }
+                }
+                worst
+            };
+            let early = draw(0.5);
+            let off = worst(&early);
+            assert!(off <= 0.5 + LEVEL_ROUNDING, "turn {turn}: {off} levels");
+            assert!(early.depth == whole.depth);
+            ended += early
+                .colour
+                .iter()
+                .flatten()
+                .zip(whole.colour.iter().flatten())
+                .filter(|(a, b)| a != b)
+                .count();
+            loose = loose.max(worst(&draw(8.0)));
+        }
+    }
+    assert!(ended > 1000, "only {ended} rays end early");
+    assert!(loose > 1.0, "{loose} levels");
     close(gpu);
 }

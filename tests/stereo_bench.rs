@@ -135,6 +135,32 @@ fn every_run_and_method_sees_the_same_frames() {
     assert!(frames[0] != frames[1] || frames[1] != frames[2], "nothing moves: {frames:?}");
 }
 
+/// Another program can draw the same frames: what they show is said, and is where the documentation of the path has it.
+#[test]
+fn the_answer_says_what_each_frame_shows() {
+    let answer = bench().json(&format!("{TINY} --methods solid --clip plane"));
+    let path = &answer["path"];
+    assert_eq!(number(&path["step_mm"]), 0.25, "a quarter of the smallest spacing");
+    assert!(path["light"].is_array() && number(&path["ambient"]) > 0.0 && number(&path["diffuse"]) > 0.0);
+    let frames = path["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    // At the start of the path, in a volume of 16 mm.
+    assert_eq!(frames[0]["clip"]["translate_mm"], json!([4.0, 0.0, 0.0]));
+    assert_eq!(frames[0]["clip"]["rotate_deg"], json!([0.0, 0.0, 0.0]));
+    assert_ne!(frames[0]["clip"], frames[1]["clip"]);
+    for frame in frames {
+        let views = frame["views"].as_array().unwrap();
+        assert_eq!(views.len(), 2);
+        assert_ne!(views[0]["position_mm"], views[1]["position_mm"]);
+        let tan = |view: &Value, side: &str| number(&view["tan"][side]);
+        // Each eye's field of view is shifted towards the other's side.
+        assert!(tan(&views[0], "left") + tan(&views[0], "right") > 0.0);
+        assert!(tan(&views[1], "left") + tan(&views[1], "right") < 0.0);
+    }
+    let still = bench().json(&format!("{TINY} --methods solid --clip none"));
+    assert_eq!(still["path"]["frames"][0]["clip"], Value::Null);
+}
+
 #[test]
 fn any_shape_can_move_also_a_mesh_and_nothing() {
     let folder = bench();

@@ -7,8 +7,11 @@
 // Largest group count along one axis that every device has.
 const GROUPS_PER_ROW = 65535u;
 const TILE = 8u;
+// Segments of a chunk, the last window permitting.
+const CHUNK = 8;
 
-// Blocks `first` ... `first + count` of the lines of a tile.
+// Chunks `first` ... `first + count` of the lines of a tile, the first being the one in whose steps the ray backwards from
+// step 0 is found.
 struct Run {
     tile: u32,
     first: u32,
@@ -50,6 +53,17 @@ fn line_at(tile: u32, local: vec2<u32>, tiles: vec2<u32>, axis: u32, dims: vec3<
 fn line_steps(layer: i32, axis: u32, dims: vec3<i32>, step: vec3<i32>) -> i32 {
     let stride = abs(step[axis]);
     return (dims[axis] - layer + stride - 1) / stride;
+}
+
+// Chunk c is the steps c size ... c size + size - 1.
+fn chunk_size(window: i32) -> i32 {
+    return min(window, CHUNK);
+}
+
+// Rays that end in a chunk and go backwards begin up to so many chunks further on.
+fn chunk_lag(window: i32) -> i32 {
+    let size = chunk_size(window);
+    return (window + size) / size;
 }
 
 // Into 0 ... dims - 1.

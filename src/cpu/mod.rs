@@ -120,7 +120,7 @@ fn blend(position: [f64; 3], value: impl Fn([i64; 3]) -> f64) -> f64 {
 }
 
 /// `f` of every index below `count`, in order, on all cores.
-fn each<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(crate) fn each<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let share = count.div_ceil(cores).max(1);
     let f = &f;

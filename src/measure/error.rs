@@ -92,13 +92,17 @@ pub fn shape_errors(found: &[f32], reference: &[f32], counts: &[bool]) -> (Error
 /// Which voxels a sample with opacity can interpolate: those with opacity, or with a neighbour that has some (faces, edges
 /// and corners). x fastest.
 pub fn counting(grid: &Grid, opacity: &[f32]) -> Vec<bool> {
-    let solid = |voxel: [usize; 3]| opacity[grid.index(voxel)] > 0.0;
-    (0..grid.len())
-        .map(|i| {
-            let voxel = grid.voxel(i);
-            solid(voxel) || grid.neighbours(voxel).any(solid)
-        })
-        .collect()
+    let mut near: Vec<bool> = opacity.iter().map(|a| *a > 0.0).collect();
+    let mut stride = 1;
+    for n in grid.dims {
+        let wider = (0..near.len()).map(|i| {
+            let at = i / stride % n;
+            near[i] || (at > 0 && near[i - stride]) || (at + 1 < n && near[i + stride])
+        });
+        near = wider.collect();
+        stride *= n;
+    }
+    near
 }
 
 /// An image of 8-bit accessibility, 0 = fully occluded … 255 = unobstructed; rows from the top.

@@ -19,6 +19,7 @@ pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod reference;
+pub mod ssao;
 pub mod sweep;
 pub mod sweep_list;
 pub mod transfer;

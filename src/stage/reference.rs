@@ -119,28 +119,41 @@ pub fn upload_clearance(gpu: &Gpu, field: &Field, opacity: &[f32]) -> Result<Ima
     Ok(image)
 }
 
-/// Two sweeps over the voxels, each taking what the 13 neighbours before it have.
-fn clearance([nx, ny, nz]: [usize; 3], opacity: &[f32]) -> Vec<u8> {
+/// Two sweeps over the voxels, each taking what the 13 neighbours before it have; those after it are before it in the
+/// reversed volume.
+fn clearance(dims: [usize; 3], opacity: &[f32]) -> Vec<u8> {
     let mut clear: Vec<u8> = opacity.iter().map(|a| if *a > 0.0 { 0 } else { 255 }).collect();
-    let neighbours = |i: usize| {
-        let at = [i % nx, i / nx % ny, i / nx / ny].map(|c| c as isize);
-        (0..13_isize).filter_map(move |n| {
-            let [x, y, z] = [at[0] + n % 3 - 1, at[1] + n / 3 % 3 - 1, at[2] + n / 9 - 1];
-            let inside = |c: isize, n: usize| (0..n as isize).contains(&c);
-            (inside(x, nx) && inside(y, ny) && inside(z, nz))
-                .then(|| (z as usize * ny + y as usize) * nx + x as usize)
-        })
-    };
-    let last = opacity.len() - 1;
-    // The neighbours after a voxel are those before it in the reversed volume.
-    for place in [|i: usize, _: usize| i, |i: usize, last: usize| last - i] {
-        for i in 0..opacity.len() {
-            let least = neighbours(i).map(|n| clear[place(n, last)]).min().unwrap_or(255);
-            let own = &mut clear[place(i, last)];
-            *own = (*own).min(least.saturating_add(1));
-        }
+    for _ in 0..2 {
+        sweep(dims, &mut clear);
+        clear.reverse();
     }
     clear
+}
+
+fn sweep([nx, ny, nz]: [usize; 3], clear: &mut [u8]) {
+    let mut least = vec![255; nx];
+    for row in 0..ny * nz {
+        let (before, own) = clear.split_at_mut(row * nx);
+        let own = &mut own[..nx];
+        let (y, z) = (row % ny, row / ny);
+        // The rows before this one that touch it: one in its slice, three in the slice before.
+        least.fill(255);
+        for (dy, dz) in [(-1, 0), (-1, -1), (0, -1), (1, -1)] {
+            let (y, z) = (y as isize + dy, z as isize + dz);
+            if y >= 0 && y < ny as isize && z >= 0 {
+                let first = (z as usize * ny + y as usize) * nx;
+                least
+                    .iter_mut()
+                    .zip(&before[first..first + nx])
+                    .for_each(|(least, c)| *least = (*least).min(*c));
+            }
+        }
+        for x in 0..nx {
+            let beside = least[x].min(least[x.saturating_sub(1)]).min(least[(x + 1).min(nx - 1)]);
+            let behind = if x > 0 { own[x - 1] } else { 255 };
+            own[x] = own[x].min(beside.min(behind).saturating_add(1));
+        }
+    }
 }
 
 impl Reference {

@@ -23,7 +23,7 @@ struct Params {
     dims: [u32; 3],
     axis: u32,
     step: [i32; 3],
-    block: u32,
+    window: u32,
     bricks: [u32; 3],
     flags: u32,
     tiles: [u32; 2],
@@ -35,23 +35,25 @@ struct Params {
     share: f32,
 }
 layout_check!(Params => shaders::sweep::SWEEP_PARAMS {
-    dims, axis, step, block, bricks, flags, tiles, list, pieces, depth, start, far, share
+    dims, axis, step, window, bricks, flags, tiles, list, pieces, depth, start, far, share
 });
 
-/// Longest block of the kernel, in segments.
+/// Longest window of the kernel, in segments.
 const MOST_SEGMENTS: u32 = 128;
 /// Edge of a tile of lines, as the kernels have it.
 const TILE: u32 = 8;
+/// Segments of a chunk, as the kernels have it.
+const CHUNK: u32 = 8;
 
-/// One direction as the kernels walk it.
+/// One direction and its reverse as the kernels walk them.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
-    /// The lattice direction.
+    /// The lattice direction, its last component that is not 0 positive; the weight is that of each of the two.
     pub ray: LatticeRay,
     /// Axis along which lines are walked: one of stride 1 where there is one, x last, so that lanes lie along x.
     pub axis: usize,
-    /// Segments of a block: W − 1, at least 1.
-    pub block: u32,
+    /// Segments of a window, behind the first of a ray: W − 1, at least 1.
+    pub window: u32,
     /// Segments of a ray, W.
     pub segments: u32,
     /// Pieces of a segment.
@@ -71,7 +73,7 @@ impl Walk {
     }
 }
 
-/// A sweep: its directions in the order of summation, and its settings.
+/// A sweep: its directions in the order of summation, each with its reverse, and its settings.
 #[derive(Clone, Debug)]
 pub struct SweepPlan {
     /// The directions.
@@ -109,7 +111,9 @@ impl SweepPlan {
         }
         let mut walks = Vec::new();
         let mut reach_mm: f64 = 0.0;
-        for ray in rays.rays {
+        // Sets are symmetric: the other half are the reverses, of equal weight.
+        let forward = |ray: &LatticeRay| ray.step.into_iter().rev().find(|&c| c != 0) > Some(0);
+        for ray in rays.rays.into_iter().filter(forward) {
             let length_mm = ray.length_mm(spacing);
             if offset_mm >= length_mm {
                 return Err(Error::Config {
@@ -137,13 +141,15 @@ impl SweepPlan {
                 .filter(|&a| ray.step[a] != 0)
                 .min_by_key(|&a| ray.step[a].unsigned_abs())
                 .unwrap_or(2);
-            let block = (segments - 1).max(1);
+            let window = (segments - 1).max(1);
             let across: [usize; 2] = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
             let tiles = across.map(|a| dims[a].div_ceil(TILE));
             let stride = ray.step[axis].unsigned_abs();
-            let blocks = dims[axis].div_ceil(stride) / block + 1;
-            let runs = tiles[0] * tiles[1] * stride * blocks.div_ceil(2);
-            walks.push(Walk { ray, axis, block, segments, pieces, length_mm, tiles, runs });
+            // A run is a chunk with a voxel and `lag` more; between two runs is one at least.
+            let size = window.min(CHUNK);
+            let (chunks, lag) = (dims[axis].div_ceil(stride).div_ceil(size), window / size + 1);
+            let runs = tiles[0] * tiles[1] * stride * chunks.div_ceil(lag + 2);
+            walks.push(Walk { ray, axis, window, segments, pieces, length_mm, tiles, runs });
         }
         Ok(Self { walks, residual: rays.residual, offset_mm, reach_mm })
     }
@@ -152,15 +158,17 @@ impl SweepPlan {
 /// The kernel `sweep`.
 pub struct Sweep {
     pipeline: Pipeline,
+    pieces: Pipeline,
 }
 
 impl Sweep {
-    /// Builds the pipeline.
+    /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::sweep::SHADER, "main")? })
+        let build = |entry| gpu.compute(&shaders::sweep::SHADER, entry);
+        Ok(Self { pipeline: build("main")?, pieces: build("pieces")? })
     }
 
-    /// Adds direction `index` of a plan. The first one begins the sum.
+    /// Adds direction `index` of a plan and its reverse. The first one begins the sum.
     #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
     pub fn record(
         &self,
@@ -180,7 +188,7 @@ impl Sweep {
             dims: field.dims,
             axis: walk.axis as u32,
             step: walk.ray.step,
-            block: walk.block,
+            window: walk.window,
             bricks: field.bricks(),
             flags: u32::from(index == 0),
             tiles: walk.tiles,
@@ -198,6 +206,7 @@ impl Sweep {
             ("ambient", Bind::Image(ambient)),
         ];
         let at = super::sweep_list::HEAD_BYTES * index as u64;
-        rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), list, at)
+        let pipeline = if walk.pieces > 1 { &self.pieces } else { &self.pipeline };
+        rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), list, at)
     }
 }

@@ -1,5 +1,6 @@
-//! Compaction for the line sweep (method.md §4, sparse sweeps): for each direction and tile of 8×8 lines, the runs of blocks
-//! in which some voxel's brick is to do; each direction's run count is the argument of its indirect dispatch.
+//! Compaction for the line sweep (method.md §4, sparse sweeps): for each direction and tile of 8×8 lines, the runs of chunks
+//! in which some voxel's brick is to do, each followed by those in which these voxels' rays backwards are found; each
+//! direction's run count is the argument of its indirect dispatch.
 //!
 //! In: `todo` (a u32 a brick). Out: `list`. Cost: a few reads a brick and direction.
 
@@ -15,11 +16,11 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
     dims: [u32; 3],
-    directions: u32,
-    bricks: [u32; 3],
     pad: u32,
+    bricks: [u32; 3],
+    pad_end: u32,
 }
-layout_check!(Params => shaders::sweep_list::LIST_PARAMS { dims, directions, bricks });
+layout_check!(Params => shaders::sweep_list::LIST_PARAMS { dims, bricks });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -28,9 +29,9 @@ struct Direction {
     axis: u32,
     tiles: [u32; 2],
     count: u32,
-    block: u32,
+    window: u32,
 }
-layout_check!(Direction => shaders::sweep_list::DIRECTION { step, axis, tiles, count, block });
+layout_check!(Direction => shaders::sweep_list::DIRECTION { step, axis, tiles, count, window });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -48,7 +49,7 @@ layout_check!(Head => shaders::sweep::SWEEP_HEAD { groups_x, groups_y, groups_z,
 pub const HEAD_BYTES: u64 = size_of::<Head>() as u64;
 /// Heads in a list.
 const HEADS: usize = 54;
-/// Bytes of a run: tile, first block, blocks.
+/// Bytes of a run: tile, first chunk, chunks.
 const RUN_BYTES: u64 = 12;
 
 /// Device memory of the list of one plan.
@@ -75,7 +76,7 @@ impl SweepLists {
                 axis: walk.axis as u32,
                 tiles: walk.tiles,
                 count: walk.tile_count(),
-                block: walk.block,
+                window: walk.window,
             });
         }
         directions.resize(directions.len().max(1), Direction::zeroed());
@@ -116,7 +117,7 @@ impl SweepList {
         rec.update(&lists.list, 0, bytemuck::bytes_of(&lists.heads))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let directions = plan.walks.len() as u32;
-        let params = Params { dims: field.dims, directions, bricks: field.bricks(), pad: 0 };
+        let params = Params { dims: field.dims, pad: 0, bricks: field.bricks(), pad_end: 0 };
         let binds = [
             ("directions", Bind::Buffer(&lists.directions)),
             ("todo", Bind::Buffer(todo)),

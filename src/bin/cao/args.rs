@@ -1,9 +1,10 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in `common`.
 
 pub use crate::common::args::{Global, Raw, Settings, open, setup, shape, usage};
-use crate::common::args::{length, number, size, three, triple};
+use crate::common::args::{length, number, positive, size, three, triple};
 use anyhow::{Context, Result};
 use cao::clip::{Clip, Mode, Pose};
+use cao::measure::stability::Sweep;
 use cao::scene::Method;
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
@@ -47,6 +48,12 @@ pub enum Command {
     /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(Verify),
+    /// Chart time against error for every method after every kind of change, on this device
+    #[command(after_help = CHART_EXAMPLES)]
+    Chart(Chart),
+    /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
     /// Show a volume's header, value range and histogram
     Info(Info),
     /// List the Vulkan devices
@@ -59,6 +66,7 @@ Examples:
       --clip sphere --clip-scale 40 --clip-translate 38,-38,38
   cao render head.nrrd --transfer ct-bone -o stereo.png \\
       --clip box --clip-mode keep --clip-scale 60,80,90
+  cao render head.nrrd --transfer ct-bone --budget-ms 20 -o stereo.png
   cao render head.nrrd --eyes left.png,right.png \\
       --clip tool.obj --clip plane --clip-rotate 0,90,0";
 
@@ -67,6 +75,7 @@ Examples:
   cao occlusion head.nrrd --transfer ct-bone -o ao.nrrd
   cao occlusion ct.raw --dims 512,512,110 --type int16 --spacing 0.7,0.7,1.5 \\
       --rays 50w --quadrature segment -o ao.nrrd
+  cao occlusion head.nrrd --transfer ct-bone --budget-error 0.01 -o ao.nrrd
   cao occlusion builtin:engine:64 --method cao --clip torus --clip-scale 20 \\
       -o ao.nrrd --mask-out vm.nrrd";
 
@@ -77,6 +86,26 @@ Examples:
   cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
 
 Exit code 1 if any voxel or any point that both eyes see differs.";
+
+const CHART_EXAMPLES: &str = "\
+Examples:
+  cao chart -o chart                      three built-in scenes, some ten minutes
+                                          without a GPU
+  cao chart --quick -o chart              a first look, two minutes
+  cao chart head.nrrd --transfer ct-bone --radius-mm 20 -o chart
+  cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
+
+Writes report.html, which stands alone, chart.svg, chart.png and runs.csv, every
+run of every method. A scene without clips gets a ball.";
+
+const STABILITY_EXAMPLES: &str = "\
+Examples:
+  cao stability -o stability            all sweeps; open stability/index.html
+  cao stability -o out --quick --only stereo,views
+  cao stability --list
+
+Exit code 1 if ours fails where it claims to hold, or the method that a sweep
+is there to catch does not.";
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
 #[derive(Args)]
@@ -97,6 +126,26 @@ pub struct Clips {
     /// Scale the shape, whose radius or half-edge is 1 mm; a mesh has the file's size in mm
     #[arg(long, value_name = "S|SX,SY,SZ", value_parser = scale, allow_hyphen_values = true)]
     pub clip_scale: Vec<[f32; 3]>,
+}
+
+/// Settings chosen by what they cost in the scene at hand.
+#[derive(Args)]
+#[command(next_help_heading = "Occlusion")]
+pub struct Budget {
+    /// Choose the cheapest settings whose error stays below E (root mean square, 0 to 1, against converged occlusion), measured on samples
+    /// of this scene; --method, --rays and --quadrature limit the choice
+    #[arg(long, value_name = "E", value_parser = budget, conflicts_with = "budget_ms")]
+    pub budget_error: Option<f64>,
+    /// Choose the most accurate settings that compute all occlusion in T ms on this device
+    #[arg(long, value_name = "T", value_parser = budget)]
+    pub budget_ms: Option<f64>,
+}
+
+fn budget(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|b: &f64| b.is_finite() && *b > 0.0)
+        .ok_or_else(|| "expected a number > 0".into())
 }
 
 #[derive(Args)]
@@ -125,10 +174,12 @@ pub struct Render {
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
     /// Draw without ambient occlusion
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["budget_error", "budget_ms"])]
     pub solid: bool,
     #[command(flatten)]
     pub settings: Settings,
+    #[command(flatten)]
+    pub budget: Budget,
     /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
     /// comparison [default: cao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
@@ -154,6 +205,8 @@ pub struct Occlusion {
     pub mask_out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: Settings,
+    #[command(flatten)]
+    pub budget: Budget,
     /// lao: every ray of every voxel; cao: first without clips, then only what the clips change; sweep: whole lines of voxels at once,
     /// many times faster [default: lao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
@@ -188,6 +241,48 @@ pub struct Verify {
     pub settings: Settings,
     #[command(flatten)]
     pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Chart {
+    /// Scene files (.toml), volume files, or builtin:NAME:SIZE [default: engine, fruit, skeleton]
+    pub scenes: Vec<String>,
+    /// Folder for report, chart and numbers; made where there is none
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Fewer settings, smaller built-in scenes, a coarser reference
+    #[arg(long)]
+    pub quick: bool,
+    /// A peers.json of tools/peers, for a table of other systems in the report
+    #[arg(long, value_name = "FILE")]
+    pub peers: Option<PathBuf>,
+    /// Timed runs of every method and change
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub runs: u32,
+    /// Opacity and colour of values, as in `cao render` [default: the scene's, auto for volumes]
+    #[arg(long, value_name = "FILE|PRESET")]
+    pub transfer: Option<String>,
+    /// Length of the rays in mm [default: the scene's; 8 voxels for the default scenes, else 20]
+    #[arg(long, value_name = "R", value_parser = positive, allow_hyphen_values = true)]
+    pub radius_mm: Option<f32>,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Stability {
+    /// Folder for index.html, and for each sweep its data (CSV) and charts (SVG, PNG); made where missing
+    #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Only these sweeps, as --list names them
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Sweep::parse(s))]
+    pub only: Vec<Sweep>,
+    /// Fewer and coarser steps: under a minute instead of some minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Name the sweeps, and do nothing else
+    #[arg(long)]
+    pub list: bool,
 }
 
 #[derive(Args)]

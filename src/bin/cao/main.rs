@@ -1,12 +1,15 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+mod budget;
+mod chart;
 #[path = "../common/mod.rs"]
 mod common;
 mod devices;
 mod info;
 mod occlusion;
 mod render;
+mod stability;
 mod verify;
 
 use clap::{CommandFactory, FromArgMatches};
@@ -25,6 +28,8 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&cli.global, a, of_command),
         args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
         args::Command::Verify(a) => verify::run(&cli.global, a),
+        args::Command::Chart(a) => chart::run(&cli.global, a),
+        args::Command::Stability(a) => stability::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };

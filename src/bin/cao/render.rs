@@ -1,6 +1,7 @@
 //! `cao render`: a picture for both eyes.
 
 use crate::args::{self, Global, Render, usage};
+use crate::budget;
 use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
 use cao::picture::Picture;
@@ -64,6 +65,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&scene.clips)?;
+    let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
     progress.stage("drawing");
@@ -77,7 +79,10 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
-    out.setup(&setup, &volume);
+    out.setup(renderer.setup(), &volume);
+    if let Some(planned) = &planned {
+        planned.print(&mut out);
+    }
     out.image(size);
     out.timings(&timings);
     out.memory(&gpu, &volume);

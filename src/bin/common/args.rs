@@ -160,7 +160,7 @@ pub fn length(text: &str) -> Result<f32, String> {
     number(text, "a length >= 0 mm", |mm| mm >= 0.0)
 }
 
-fn positive(text: &str) -> Result<f32, String> {
+pub fn positive(text: &str) -> Result<f32, String> {
     number(text, "a length > 0 mm", |mm| mm > 0.0)
 }
 

@@ -254,6 +254,11 @@ impl Progress {
         });
     }
 
+    /// What goes on in the stage just now.
+    pub fn say(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
     /// Share of the stage that is done, 0 … 1.
     pub fn set(&mut self, done: f64) {
         if self.bar.position() == 0 {

@@ -2,8 +2,11 @@
 
 use super::frames::{Configuration, Frame, Measured, PARTS, Plan};
 use super::method::Method;
+use super::path;
 use super::statistics::{median, percentile};
 use super::suite::Outcome;
+use anyhow::Result;
+use cao::view::View;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -115,6 +118,45 @@ pub fn series_table(points: &[Outcome]) -> String {
         text += &format!("{:<14}{}\n", point.value, cells.collect::<String>());
     }
     text + "              medians of frames, and of their ratios to the first line's; all take turns\n"
+}
+
+/// What the counted frames show, for whoever draws the same with another program: eyes and clip of each, light, step.
+pub fn path_json(c: &Configuration, plan: &Plan) -> Result<Value> {
+    let size_mm = c.input.volume.size_mm();
+    let aspect = c.size[0] as f32 / c.size[1] as f32;
+    let frame = |number| -> Result<Value> {
+        let views = path::views(size_mm, aspect, c.views, number)?;
+        let clip = plan.clip.iter().map(|shape| path::clip(shape, size_mm, number).pose).next();
+        Ok(json!({
+            "views": views.iter().map(view_json).collect::<Vec<_>>(),
+            "clip": clip.map(|pose| json!({
+                "translate_mm": pose.translate_mm.to_array(),
+                "rotate_deg": pose.rotate_deg.to_array(),
+                "scale": pose.scale.to_array(),
+            })),
+        }))
+    };
+    // The path closes.
+    let frames = (0..plan.frames.min(path::PERIOD).into()).map(frame).collect::<Result<Vec<_>>>()?;
+    let look = Method::Cao.look();
+    Ok(json!({
+        "ambient": look.ambient,
+        "diffuse": look.diffuse,
+        "light": look.light.to_array(),
+        "step_mm": look.step(c.input.volume.min_spacing() as f32),
+        "frames": frames,
+    }))
+}
+
+fn view_json(view: &View) -> Value {
+    let tan = view.tan;
+    json!({
+        "position_mm": view.position.to_array(),
+        "orientation_xyzw": view.orientation.to_array(),
+        "tan": { "left": tan.left, "right": tan.right, "up": tan.up, "down": tan.down },
+        "near_mm": view.near_mm,
+        "far_mm": view.far_mm,
+    })
 }
 
 /// One configuration and its methods; in a series with its value and the growth since the series' first.

@@ -67,6 +67,9 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     out.line(format!("machine   {machine}"));
     out.json(json!({ "machine": machine, "version": env!("CARGO_PKG_VERSION") }));
     say(cli, &mut out, &plan, &results);
+    if let Some(base) = results.first() {
+        out.json(json!({ "path": report::path_json(&base.configuration, &plan)? }));
+    }
     let (table, summary) = (csv::table(&results), out.text().to_owned());
     if let Some(path) = &cli.csv {
         std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;

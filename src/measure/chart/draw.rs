@@ -1,0 +1,255 @@
+//! The chart as a drawing: one panel for each kind of change, time against error, both logarithmic, the Pareto front drawn.
+//!
+//! Colours are methods, shapes rules along the rays, hollow marks equal weights; whiskers are quartiles. Where there are
+//! several scenes a mark is the geometric mean of their times and the root of the mean of their squared errors.
+
+use super::front::front;
+use super::{Change, Chart, Point, SceneChart};
+use crate::measure::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
+use crate::occlusion::Quadrature;
+
+/// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
+const COLOURS: [&str; 6] = ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73"];
+const GREY: &str = "#777777";
+const FRONT: &str = "#aaaaaa";
+
+/// Radius of a mark.
+const RADIUS: f64 = 4.5;
+/// Size of the labels beside marks.
+const SMALL: u32 = 10;
+/// Frames of the panels, and what is around them.
+const FRAME: [f64; 2] = [440.0, 300.0];
+const LEFT: f64 = 70.0;
+const TOP: f64 = 66.0;
+const BETWEEN: [f64; 2] = [84.0, 86.0];
+const WIDTH: f64 = LEFT + 2.0 * FRAME[0] + BETWEEN[0] + 24.0;
+
+/// One contender in one panel.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Any of the points that it stands for.
+    pub of: Point,
+    /// Time, lower and upper quartile: ms, or ratios to the baseline.
+    pub time: [f64; 3],
+    /// RMSE of the ambient factor.
+    pub error: f64,
+}
+
+/// The marks of one kind of change over these scenes, in the order of the contenders.
+pub fn marks(scenes: &[&SceneChart], change: Change, ratios: bool) -> Vec<Mark> {
+    let of_change = |scene: &SceneChart| -> Vec<Point> {
+        scene.points.iter().filter(|point| point.change == change).cloned().collect()
+    };
+    let Some((first, others)) = scenes.split_first() else { return Vec::new() };
+    let others: Vec<Vec<Point>> = others.iter().map(|scene| of_change(scene)).collect();
+    let mark = |point: Point| {
+        let same = |p: &&Point| p.method == point.method && p.setting == point.setting;
+        let all: Vec<&Point> = std::iter::once(&point)
+            .chain(others.iter().filter_map(|points| points.iter().find(same)))
+            .collect();
+        let n = all.len() as f64;
+        let times = all.iter().map(|p| if ratios { p.ratio() } else { p.ms() });
+        let logs = times.fold([0.0; 3], |sum, t| [0, 1, 2].map(|i| sum[i] + t[i].ln() / n));
+        let squares = all.iter().map(|p| p.errors.rmse * p.errors.rmse / n).sum::<f64>();
+        Mark { time: logs.map(f64::exp), error: squares.sqrt(), of: point }
+    };
+    of_change(first).into_iter().map(mark).collect()
+}
+
+/// Marks that lie on the Pareto front, from the fastest on. What has no ambient values to compute, and what has them elsewhere than at
+/// voxels, does not compete.
+pub fn front_of(marks: &[Mark]) -> Vec<usize> {
+    let points = marks.iter().map(|mark| {
+        let competes = mark.time[1] > 0.0 && !mark.of.on_surface;
+        [mark.time[1], if competes { mark.error } else { f64::NAN }]
+    });
+    front(&points.collect::<Vec<_>>())
+}
+
+/// What the time axis shows.
+pub fn time_label(ratios: bool) -> &'static str {
+    match ratios {
+        true => "time to bring ambient occlusion up to date / that of LAO (unit), 26 rays",
+        false => "time to bring ambient occlusion up to date, ms",
+    }
+}
+
+/// Draws the chart of these scenes, `caption` below it, one entry a line.
+pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawing {
+    let ratios = chart.software;
+    let legend_top = TOP + 2.0 * FRAME[1] + BETWEEN[1] + 62.0;
+    let methods = methods(scenes);
+    let height = legend_top + 44.0 + 15.0 * caption.len() as f64 + 10.0;
+    let mut drawing = Drawing::new(WIDTH, height);
+    let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
+    let title = format!("Ambient occlusion after a change: time against error. {}", names.join(", "));
+    drawing.text([LEFT, 28.0], &title, 16, Anchor::Start, INK, true);
+
+    let panels: Vec<(Change, Vec<Mark>)> =
+        Change::ALL.into_iter().map(|change| (change, marks(scenes, change, ratios))).collect();
+    let every = || panels.iter().flat_map(|(_, marks)| marks);
+    let x = Axis::log(time_label(ratios), every().flat_map(|mark| mark.time));
+    let y = Axis::log("error: RMSE of the ambient factor", every().map(|mark| mark.error));
+    for (n, (change, marks)) in panels.iter().enumerate() {
+        let (column, row) = ((n % 2) as f64, (n / 2) as f64);
+        let at = [LEFT + column * (FRAME[0] + BETWEEN[0]), TOP + row * (FRAME[1] + BETWEEN[1])];
+        let panel = Panel { at, size: FRAME, x: x.clone(), y: y.clone() };
+        panel.draw(&mut drawing, change.name());
+        fill(&mut drawing, &panel, marks, &methods);
+    }
+    legend(&mut drawing, legend_top, &methods);
+    for (n, line) in caption.iter().enumerate() {
+        let y = legend_top + 44.0 + 15.0 * n as f64;
+        drawing.text([LEFT, y], line, 11, Anchor::Start, GREY, false);
+    }
+    drawing
+}
+
+/// Names of the methods, in the order of the contenders.
+fn methods(scenes: &[&SceneChart]) -> Vec<&'static str> {
+    let mut methods: Vec<&str> = Vec::new();
+    for point in scenes.iter().flat_map(|scene| &scene.points) {
+        if !methods.contains(&point.method) {
+            methods.push(point.method);
+        }
+    }
+    // The baseline is measured first and keeps its place in the list.
+    methods.sort_by_key(|method| super::contender::place(method));
+    methods
+}
+
+fn colour(methods: &[&str], method: &str) -> &'static str {
+    match methods.iter().position(|m| *m == method) {
+        Some(n) if n > 0 => COLOURS[(n - 1) % COLOURS.len()],
+        _ => GREY,
+    }
+}
+
+fn shape(quadrature: Option<Quadrature>) -> Marker {
+    match quadrature {
+        Some(Quadrature::Left) => Marker::Circle,
+        Some(Quadrature::Cell) => Marker::Square,
+        Some(Quadrature::Segment) => Marker::Triangle,
+        None => Marker::Diamond,
+    }
+}
+
+/// Equal weights, as in the paper.
+fn hollow(point: &Point) -> bool {
+    point.setting.quadrature.is_some() && !point.setting.label.ends_with('w')
+}
+
+fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) {
+    let [left, right] = [panel.at[0], panel.at[0] + panel.size[0]];
+    let front = front_of(marks);
+    let place = |mark: &Mark| panel.place(mark.time[1], mark.error);
+    // The front as the stairs that bound what has been reached.
+    let mut stairs: Vec<[f64; 2]> = Vec::new();
+    for &i in &front {
+        let [x, y] = place(&marks[i]);
+        match stairs.last() {
+            Some(&[_, before]) => stairs.extend([[x, before], [x, y]]),
+            None => stairs.extend([[x, panel.at[1]], [x, y]]),
+        }
+    }
+    stairs.extend(stairs.last().map(|&[_, y]| [right, y]));
+    drawing.polyline(&stairs, FRONT, 2.0, false);
+
+    let mut taken: Vec<[f64; 4]> = Vec::new();
+    let mut labels = Vec::new();
+    for (i, mark) in marks.iter().enumerate() {
+        let at = place(mark);
+        let colour = colour(methods, mark.of.method);
+        if mark.time[1] <= 0.0 {
+            drawing.line([left, at[1]], [right, at[1]], colour, 1.5, true);
+            let text = format!("{}, no cost", mark.of.method);
+            drawing.text([right - 6.0, at[1] - 5.0], &text, SMALL, Anchor::End, colour, false);
+            let width = text_width(&text, SMALL);
+            taken.push([right - 6.0 - width, at[1] - 15.0, right - 6.0, at[1] + 2.0]);
+            continue;
+        }
+        let [low, _, high] = mark.time.map(|t| panel.place(t, mark.error)[0]);
+        drawing.line([low, at[1]], [high, at[1]], colour, 1.0, false);
+        drawing.marker(shape(mark.of.setting.quadrature), at, RADIUS, colour, hollow(&mark.of));
+        let around = RADIUS + 1.0;
+        taken.push([at[0] - around, at[1] - around, at[0] + around, at[1] + around]);
+        if front.contains(&i) || mark.of.is_baseline() || mark.of.on_surface {
+            labels.push((at, mark.of.setting.label.clone(), colour));
+        }
+    }
+    for (at, text, colour) in labels {
+        label(drawing, panel, at, &text, colour, &mut taken);
+    }
+}
+
+/// Writes a label near a mark where it covers nothing; nowhere if there is no such place.
+fn label(
+    drawing: &mut Drawing,
+    panel: &Panel,
+    [x, y]: [f64; 2],
+    text: &str,
+    colour: &str,
+    taken: &mut Vec<[f64; 4]>,
+) {
+    let (width, height) = (text_width(text, SMALL), f64::from(SMALL));
+    // Left edge and base line, near to far.
+    let away = RADIUS + 4.0;
+    let near = |d: f64| {
+        [
+            [x - 0.5 * width, y + d + 0.8 * height],
+            [x - d - width, y + d + 0.4 * height],
+            [x + d, y - d],
+            [x - d - width, y - d],
+            [x - 0.5 * width, y - d],
+            [x + d, y + d + 0.4 * height],
+        ]
+    };
+    let ([left, top], [w, h]) = (panel.at, panel.size);
+    for [x, base] in [away, away + 10.0, away + 22.0].into_iter().flat_map(near) {
+        let own = [x - 1.0, base - height, x + width + 1.0, base + 3.0];
+        let inside = own[0] > left && own[1] > top && own[2] < left + w && own[3] < top + h;
+        let free = taken.iter().all(|t| own[2] < t[0] || t[2] < own[0] || own[3] < t[1] || t[3] < own[1]);
+        if inside && free {
+            drawing.text([x, base], text, SMALL, Anchor::Start, colour, false);
+            taken.push(own);
+            return;
+        }
+    }
+}
+
+fn legend(drawing: &mut Drawing, top: f64, methods: &[&str]) {
+    let mut x = LEFT;
+    let mut entry = |drawing: &mut Drawing, text: &str, mark: &mut dyn FnMut(&mut Drawing, f64)| {
+        mark(drawing, x + 8.0);
+        drawing.text([x + 22.0, top + 4.0], text, 12, Anchor::Start, INK, false);
+        x += 22.0 + text_width(text, 12) + 16.0;
+    };
+    for method in methods {
+        let colour = colour(methods, method);
+        entry(drawing, method, &mut |drawing, x| {
+            drawing.line([x - 8.0, top], [x + 8.0, top], colour, 5.0, colour == GREY);
+        });
+    }
+    x = LEFT;
+    let top = top + 20.0;
+    let mut entry = |drawing: &mut Drawing, text: &str, marker: Option<Marker>, hollow: bool| {
+        match marker {
+            Some(marker) => drawing.marker(marker, [x + 8.0, top], RADIUS, INK, hollow),
+            None => drawing.line([x, top], [x + 16.0, top], FRONT, 2.0, false),
+        }
+        drawing.text([x + 22.0, top + 4.0], text, 12, Anchor::Start, INK, false);
+        x += 22.0 + text_width(text, 12) + 16.0;
+    };
+    for rule in Quadrature::ALL {
+        entry(drawing, &format!("{} rule", rule.name()), Some(shape(Some(rule))), false);
+    }
+    entry(drawing, "equal weights", Some(Marker::Circle), true);
+    entry(drawing, "weighted rays", Some(Marker::Circle), false);
+    entry(drawing, "no rays", Some(Marker::Diamond), false);
+    entry(drawing, "Pareto front; numbers are rays", None, false);
+}
+
+/// Two numbers with a sign between them, for captions: median and half the distance of the quartiles.
+pub fn with_spread([low, middle, high]: [f64; 3]) -> String {
+    format!("{} ± {}", short(middle), short(0.5 * (high - low)))
+}

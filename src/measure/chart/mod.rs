@@ -1,0 +1,629 @@
+//! The chart (measure.md §3): for every kind of change the time that each method takes to bring its ambient values up to
+//! date, against their error to the converged reference.
+//!
+//! One process, one device. Methods take turns: in every run each one makes the same change once, the baseline among them,
+//! so that what else the machine does touches all of them alike. Quoted are medians, with quartiles as spread; on a software
+//! driver as ratios to the baseline of the same run.
+
+pub mod csv;
+pub mod draw;
+pub mod front;
+pub mod peers;
+pub mod pictures;
+pub mod report;
+pub mod tables;
+
+use super::contender::{self, Ambient, Asked, BASELINE, Change, Contender, Entry, Setting, State, Subject};
+use super::error::{Errors, errors, shape_errors};
+use super::reference::{self, Reference};
+use super::ssim::{Constants, ssim_3d};
+use crate::clip::{Clip, Pose, Shape};
+use crate::cpu::Grid;
+use crate::gpu::{DeviceKind, Gpu, Timings};
+use crate::mesh::TriangleMesh;
+use crate::occlusion::{Occlusion, RaySet};
+use crate::renderer::{COLOUR, Categories, Renderer, Setup};
+use crate::stage::eyes::Look;
+use crate::view::{StereoRig, View};
+use crate::volume::Volume;
+use crate::{Error, Result};
+use glam::{Vec2, Vec3};
+use pictures::Shown;
+use std::sync::Arc;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Only some settings of each method?
+    pub quick: bool,
+    /// Timed runs of each change, at least 1; measure.md asks for 5.
+    pub runs: u32,
+    /// Pixels of one eye's image.
+    pub size: [u32; 2],
+    /// The reference.
+    pub reference: reference::Plan,
+}
+
+/// What is measured on.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// What the user calls it.
+    pub name: String,
+    /// The volume.
+    pub volume: Volume,
+    /// Before any change. The clips are what "clip moved" moves.
+    pub state: State,
+    /// The eyes.
+    pub rig: StereoRig,
+}
+
+/// Edge of the default clip's ball, in shares of the volume's mean edge. With a radius of a sixth of the edge it touches
+/// 15 to 20 % of the voxels, as the paper's scenes do (CAO Table 2).
+const BALL: f64 = 0.2;
+
+impl Scene {
+    /// A clip for scenes that have none: a ball of triangles, like the paper's clip meshes, near the corner that
+    /// [`StereoRig::framing`] from 30° and 25° looks at.
+    pub fn default_clip(volume: &Volume) -> Clip {
+        let size = volume.size_mm();
+        let radius = BALL * size.iter().sum::<f64>() / 3.0;
+        let pose = Pose {
+            translate_mm: Vec3::new(0.2, -0.25, 0.2) * Vec3::from_array(size.map(|s| s as f32)),
+            scale: Vec3::splat(radius as f32),
+            ..Pose::default()
+        };
+        Clip { pose, ..Clip::remove(Shape::Mesh(Arc::new(TriangleMesh::sphere(3)))) }
+    }
+
+    /// The state after a change: a small step, as an edit by hand makes in each frame.
+    pub fn after(&self, change: Change) -> State {
+        let mut state = self.state.clone();
+        match change {
+            Change::Volume => {}
+            Change::Clip => {
+                let step = Vec3::X * (CLIP_VOXELS * self.volume.min_spacing()) as f32;
+                state.clips.iter_mut().for_each(|clip| clip.pose.translate_mm += step);
+            }
+            Change::Transfer => {
+                state.transfer.opacity.iter_mut().for_each(|point| point[1] *= OPACITY_FACTOR);
+            }
+            Change::Radius => state.radius_mm *= RADIUS_FACTOR,
+        }
+        state
+    }
+
+    fn grid(&self) -> Grid {
+        Grid { dims: self.volume.dims, spacing: self.volume.spacing }
+    }
+}
+
+/// "Clip moved": by this many voxels along x.
+pub const CLIP_VOXELS: f64 = 2.0;
+/// "Transfer function edited": opacities times this.
+pub const OPACITY_FACTOR: f32 = 0.9;
+/// "Radius changed": times this.
+pub const RADIUS_FACTOR: f32 = 0.9;
+
+/// Everything that was measured.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// Name of the device.
+    pub device: String,
+    /// Its driver.
+    pub driver: String,
+    /// Whether the device is a program on the processor, whose times mean something as ratios only.
+    pub software: bool,
+    /// What was asked for.
+    pub plan: Plan,
+    /// Each scene.
+    pub scenes: Vec<SceneChart>,
+}
+
+/// One scene's part.
+#[derive(Clone, Debug)]
+pub struct SceneChart {
+    /// What the user calls it.
+    pub name: String,
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// Their distance in mm.
+    pub spacing: [f64; 3],
+    /// R before any change, mm.
+    pub radius_mm: f32,
+    /// The clips, in words.
+    pub clips: String,
+    /// The reference of the state after each kind of change.
+    pub references: Vec<(Change, Truth)>,
+    /// Categories of the voxels after the clip moved.
+    pub categories: Categories,
+    /// Of the voxels with a value, the share that the update recomputed for it.
+    pub recomputed: f64,
+    /// Each contender after each kind of change.
+    pub points: Vec<Point>,
+    /// Median time of drawing both eyes, ms: method, time.
+    pub draws: Vec<(&'static str, f64)>,
+    /// What each method shows, and where it errs; of the first scene only.
+    pub pictures: Vec<Shown>,
+}
+
+/// What a reference is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Voxels that count: those that a sample with opacity can interpolate.
+    pub counting: usize,
+    /// Of these, voxels that were computed, all or a stratified sample.
+    pub computed: usize,
+    /// Points of the surface in the left eye's image that were computed.
+    pub surface: usize,
+    /// RMS change when its resolutions are doubled.
+    pub convergence: f64,
+}
+
+/// One contender after one kind of change.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Its setting.
+    pub setting: Setting,
+    /// What changed.
+    pub change: Change,
+    /// Whether its errors are at points of the surface in the left eye's image, rather than at voxels.
+    pub on_surface: bool,
+    /// Against the ambient reference.
+    pub errors: Errors,
+    /// What remains after the best affine fit of its tone.
+    pub shape: Errors,
+    /// SSIM-3D over the reference's voxels (DVAO eq. (3), constants as printed); `None` where errors are on a surface.
+    pub ssim_3d: Option<f64>,
+    /// Every timed run.
+    pub runs: Vec<Run>,
+}
+
+/// One timed run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Each stage in ms.
+    pub stages: Timings,
+    /// All stages in ms.
+    pub total_ms: f64,
+    /// Over the total of the baseline in the same run.
+    pub ratio: f64,
+}
+
+impl Point {
+    /// Whether times are quoted against it.
+    pub fn is_baseline(&self) -> bool {
+        is_baseline(self.method, &self.setting)
+    }
+
+    /// Lower quartile, median, upper quartile of the times in ms.
+    pub fn ms(&self) -> [f64; 3] {
+        front::quartiles(self.runs.iter().map(|run| run.total_ms))
+    }
+
+    /// The same of the ratios.
+    pub fn ratio(&self) -> [f64; 3] {
+        front::quartiles(self.runs.iter().map(|run| run.ratio))
+    }
+
+    /// Median time of the stages that `of` chooses, ms.
+    pub fn stage_ms(&self, of: impl Fn(&str) -> bool) -> f64 {
+        let sum = |run: &Run| run.stages.iter().filter(|(name, _)| of(name)).map(|(_, ms)| ms).sum();
+        front::quartiles(self.runs.iter().map(sum))[1]
+    }
+}
+
+fn is_baseline(method: &str, setting: &Setting) -> bool {
+    method == BASELINE && setting.label == RaySet::R26.name()
+}
+
+/// Device memory that contenders may take at a time; where they need more, they compete in groups, the baseline in each.
+const MEMORY: usize = 1 << 30;
+/// Bytes a voxel of one contender (`Volumes`, the volume, and a little).
+const VOXEL: usize = 24;
+
+/// Points of the surface at which image-space methods are held to the reference.
+const SURFACE: usize = 1000;
+/// Points of the surface in a picture of errors; and for a first look.
+const PICTURED: [usize; 2] = [6000, 2000];
+
+/// Measures. `progress` hears what is being done and the share of the whole that is done.
+pub fn measure(
+    gpu: &Gpu,
+    scenes: &[Scene],
+    plan: &Plan,
+    progress: &mut dyn FnMut(&str, f64),
+) -> Result<Chart> {
+    if plan.runs == 0 || plan.size.contains(&0) {
+        let problem = format!("{} runs, images of {:?}; expected at least 1 of each", plan.runs, plan.size);
+        return Err(Error::Config { what: "chart".into(), problem });
+    }
+    let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(scene, plan)).sum() };
+    let mut measured = Vec::new();
+    for (n, scene) in scenes.iter().enumerate() {
+        let mut say = |what: &str, work: &Work| progress(&format!("{}: {what}", scene.name), work.share());
+        measured.push(one(gpu, scene, plan, n == 0, &mut work, &mut say)?);
+    }
+    let info = gpu.info();
+    Ok(Chart {
+        device: info.name.clone(),
+        driver: info.driver.clone(),
+        software: info.kind == DeviceKind::Cpu,
+        plan: *plan,
+        scenes: measured,
+    })
+}
+
+/// Samples of rays, done and to do: for the time that is left.
+struct Work {
+    done: f64,
+    total: f64,
+}
+
+impl Work {
+    fn share(&self) -> f64 {
+        (self.done / self.total).min(1.0)
+    }
+
+    /// Of one update of a contender.
+    fn update(scene: &Scene, entry: &Entry) -> f64 {
+        let samples = f64::from(scene.state.radius_mm) / scene.volume.min_spacing();
+        // Whatever it does, it does something.
+        (entry.work * samples + 10.0) * scene.volume.len() as f64
+    }
+
+    /// Of one reference, its check included.
+    fn reference(scene: &Scene, plan: &Plan) -> f64 {
+        let plan = &plan.reference;
+        let samples = f64::from(scene.state.radius_mm) / scene.volume.min_spacing();
+        let samples = samples * f64::from(plan.steps_per_voxel) * f64::from(plan.directions);
+        // The checked ones at twice both resolutions, the surface; its kernel skips what is empty.
+        0.5 * samples * (plan.max_voxels.min(scene.volume.len() / 5) + 4 * 1000 + SURFACE) as f64
+    }
+
+    fn of(scene: &Scene, plan: &Plan) -> f64 {
+        let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
+        let updates: f64 = contender::all(&asked).iter().map(|entry| Self::update(scene, entry)).sum();
+        let changes = Change::ALL.len() as f64;
+        changes * (updates * f64::from(plan.runs + 1) + Self::reference(scene, plan)) + updates
+    }
+}
+
+fn one(
+    gpu: &Gpu,
+    scene: &Scene,
+    plan: &Plan,
+    pictured: bool,
+    work: &mut Work,
+    say: &mut dyn FnMut(&str, &Work),
+) -> Result<SceneChart> {
+    say("preparing", work);
+    let far = 3.0 * (scene.rig.position - scene.rig.target).length().max(1.0);
+    let views = scene.rig.views(plan.size[0] as f32 / plan.size[1] as f32, 0.02 * far, far)?;
+    let subject = Subject { gpu, volume: &scene.volume, views: &views, size: plan.size };
+    let mut stand = Stand::new(subject, scene)?;
+    let mut truths = Vec::new();
+    for change in Change::ALL {
+        say("reference", work);
+        let pictured = (pictured && change == Change::Volume).then(|| PICTURED[usize::from(plan.quick)]);
+        let truth = stand.truth(change, plan, pictured.unwrap_or(SURFACE))?;
+        if truth.reference.counting == 0 {
+            let problem = format!(
+                "nothing to measure after {}: no voxel has opacity; choose another transfer function or clip",
+                change.name()
+            );
+            return Err(Error::Config { what: scene.name.clone(), problem });
+        }
+        truths.push(truth);
+        work.done += Work::reference(scene, plan);
+    }
+    let (categories, recomputed) = stand.clip_shares()?;
+
+    let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
+    let mut entries = contender::all(&asked);
+    let at = entries.iter().position(|e| is_baseline(e.method, &e.setting)).ok_or_else(no_baseline)?;
+    let baseline = entries.remove(at);
+    let group = (MEMORY / (VOXEL * scene.volume.len()).max(1)).max(2) - 1;
+    let mut points = Vec::new();
+    let mut draws = Vec::new();
+    let mut shown = Vec::new();
+    let featured: Vec<(&str, Setting)> = match pictured {
+        true => pictures::featured(std::iter::once(&baseline).chain(&entries)),
+        false => Vec::new(),
+    };
+    for (n, others) in entries.chunks(group).enumerate() {
+        let compete: Vec<&Entry> = std::iter::once(&baseline).chain(others).collect();
+        let found = compete_in(scene, subject, plan, &compete, &truths, &featured, work, say)?;
+        // The baseline's first runs stand for it.
+        let own = usize::from(n > 0);
+        points.extend(found.0.into_iter().skip(own * Change::ALL.len()));
+        draws.extend(found.1);
+        shown.extend(found.2);
+    }
+    shown.sort_by_key(|shown| contender::place(shown.method));
+    shown.dedup_by_key(|shown| shown.method);
+    draws.dedup_by_key(|(method, _)| *method);
+    let names: Vec<&str> = scene.state.clips.iter().map(|clip| clip.shape.name()).collect();
+    Ok(SceneChart {
+        name: scene.name.clone(),
+        dims: scene.volume.dims,
+        spacing: scene.volume.spacing,
+        radius_mm: scene.state.radius_mm,
+        clips: names.join(", "),
+        references: Change::ALL.into_iter().zip(truths.iter().map(Known::summary)).collect(),
+        categories,
+        recomputed,
+        points,
+        draws,
+        pictures: shown,
+    })
+}
+
+fn no_baseline() -> Error {
+    Error::Config { what: "chart".into(), problem: format!("no contender is {BASELINE} with 26 rays") }
+}
+
+/// The points of each contender for all changes, contender by contender; the draw times of each method's first; pictures of those that are
+/// featured.
+type Found = (Vec<Point>, Vec<(&'static str, f64)>, Vec<Shown>);
+
+#[expect(clippy::too_many_arguments, reason = "what competes, on what, and who listens, each named once")]
+fn compete_in(
+    scene: &Scene,
+    subject: Subject,
+    plan: &Plan,
+    entries: &[&Entry],
+    truths: &[Known],
+    featured: &[(&str, Setting)],
+    work: &mut Work,
+    say: &mut dyn FnMut(&str, &Work),
+) -> Result<Found> {
+    say("preparing", work);
+    let mut open: Vec<Box<dyn Contender + '_>> = Vec::new();
+    for entry in entries {
+        open.push((entry.open)(subject, &scene.state)?);
+        work.done += Work::update(scene, entry);
+        say("preparing", work);
+    }
+    let mut points: Vec<Vec<Point>> = entries.iter().map(|_| Vec::new()).collect();
+    for (change, truth) in Change::ALL.into_iter().zip(truths) {
+        let states = [&scene.after(change), &scene.state];
+        // Back and forth; the first run warms up, and its values are those that are held to the reference.
+        for run in 0..=plan.runs as usize {
+            let mut of_baseline = f64::NAN;
+            for (n, (entry, contender)) in entries.iter().zip(&mut open).enumerate() {
+                say(change.name(), work);
+                let stages = contender.update(change, states[run % 2])?;
+                work.done += Work::update(scene, entry);
+                let total_ms: f64 = stages.iter().map(|(_, ms)| ms).sum();
+                if run == 0 {
+                    points[n].push(truth.judge(scene, subject, entry, change, &contender.ambient()?));
+                    continue;
+                }
+                if n == 0 {
+                    of_baseline = total_ms;
+                    if total_ms <= 0.0 {
+                        let problem = "the device's queue has no timestamps; choose another with --device";
+                        return Err(Error::Config { what: "chart".into(), problem: problem.into() });
+                    }
+                }
+                let run = Run { stages, total_ms, ratio: total_ms / of_baseline };
+                points[n].last_mut().into_iter().for_each(|point| point.runs.push(run.clone()));
+            }
+        }
+        // An even number of runs ends where the change leads to.
+        if plan.runs.is_multiple_of(2) {
+            for contender in &mut open {
+                contender.update(change, &scene.state)?;
+            }
+        }
+    }
+    let mut draws = Vec::new();
+    let look = Look::default();
+    for (n, (entry, contender)) in entries.iter().zip(&open).enumerate() {
+        if entries[..n].iter().any(|other| other.method == entry.method) {
+            continue;
+        }
+        let mut times = Vec::new();
+        for _ in 0..plan.runs {
+            times.push(contender.draw(&look)?.1.iter().map(|(_, ms)| ms).sum());
+        }
+        draws.push((entry.method, front::quartiles(times.into_iter())[1]));
+    }
+    let mut shown = Vec::new();
+    for (entry, contender) in entries.iter().zip(&open) {
+        if featured.iter().any(|(method, setting)| *method == entry.method && *setting == entry.setting) {
+            let (image, _) = contender.draw(&look)?;
+            let found = contender.ambient()?;
+            shown.push(truths[0].shown(&scene.grid(), entry, &image, &found));
+        }
+    }
+    Ok((points.into_iter().flatten().collect(), draws, shown))
+}
+
+/// The scene without any contender: what there is to see, and the truth about it.
+struct Stand<'a> {
+    scene: &'a Scene,
+    subject: Subject<'a>,
+    renderer: Renderer,
+}
+
+/// What is known of one state.
+struct Known {
+    reference: Reference,
+    /// Of every so many pixels along both edges of the image the surface is known.
+    stride: usize,
+    /// Points of the surface in the left eye's image: index coordinates, pixel, ambient value.
+    surface: Vec<([f64; 3], usize, f32)>,
+}
+
+impl<'a> Stand<'a> {
+    fn new(subject: Subject<'a>, scene: &'a Scene) -> Result<Self> {
+        // Rays as few as can be: only the opacity and the categories are of interest.
+        let paper = Setup::paper(scene.volume.min_spacing());
+        let occlusion = Occlusion { rays: RaySet::R6, radius_mm: scene.state.radius_mm, ..paper.occlusion };
+        let setup = Setup { occlusion, ..paper };
+        let transfer = scene.state.transfer.clone();
+        let mut renderer = Renderer::new(subject.gpu, &scene.volume, transfer, setup, COLOUR)?;
+        renderer.set_clips(&scene.state.clips)?;
+        renderer.update(&mut |_| ())?;
+        Ok(Self { scene, subject, renderer })
+    }
+
+    /// The reference of the state after a change.
+    fn truth(&mut self, change: Change, plan: &Plan, most: usize) -> Result<Known> {
+        let state = self.scene.after(change);
+        self.renderer.set_transfer(state.transfer.clone())?;
+        self.renderer.set_clips(&state.clips)?;
+        self.renderer.update(&mut |_| ())?;
+        let opacity = self.renderer.read_opacity()?;
+        let (gpu, grid) = (self.subject.gpu, self.scene.grid());
+        let smallest = grid.min_spacing();
+        // Where the contenders' rays start: half a step.
+        let (radius, offset) = (f64::from(state.radius_mm), 0.5 * smallest);
+        let length = f64::from(state.transfer.reference_mm(smallest));
+        let plan = &plan.reference;
+        let quiet = &mut |_| ();
+        let reference = reference::ambient(gpu, &grid, &opacity, radius, offset, length, plan, quiet)?;
+
+        let (image, _) =
+            self.renderer.draw(self.subject.views, &contender::surface_look(), self.subject.size)?;
+        let shown = surface_points(&grid, &self.subject.views[0], self.subject.size, &image.depth[0]);
+        let (stride, shown) = thinned(shown, self.subject.size[0] as usize, most);
+        let points: Vec<[f64; 3]> = shown.iter().map(|(point, _)| *point).collect();
+        let values =
+            reference::ambient_at(gpu, &grid, &opacity, &points, radius, offset, length, plan, quiet)?;
+        let surface = shown.into_iter().zip(values).map(|((point, pixel), value)| (point, pixel, value));
+        Ok(Known { reference, stride, surface: surface.collect() })
+    }
+
+    /// Categories after the clips moved, and the share of the voxels with a value that was recomputed for it.
+    fn clip_shares(&mut self) -> Result<(Categories, f64)> {
+        self.renderer.set_transfer(self.scene.state.transfer.clone())?;
+        for clips in [&self.scene.state.clips, &self.scene.after(Change::Clip).clips] {
+            self.renderer.set_clips(clips)?;
+            self.renderer.update(&mut |_| ())?;
+        }
+        let categories = self.renderer.categories()?;
+        let (difference, _) = self.renderer.verify(&mut |_| ())?;
+        Ok((categories, difference.recomputed as f64 / (difference.compared as f64).max(1.0)))
+    }
+}
+
+/// What each pixel of an eye shows: index coordinates of the point at its depth, and the pixel.
+fn surface_points(
+    grid: &Grid,
+    view: &View,
+    [width, height]: [u32; 2],
+    depth: &[f32],
+) -> Vec<([f64; 3], usize)> {
+    let (near, far) = (view.near_mm, view.far_mm);
+    let edges = Vec2::new(width as f32, height as f32);
+    let shown = (0..depth.len()).filter(|&i| depth[i] < 1.0).map(|i| {
+        let pixel = Vec2::new((i as u32 % width) as f32, (i as u32 / width) as f32);
+        let (origin, direction) = view.ray((pixel + 0.5) / edges);
+        let world = origin + direction * (near * far / (far - depth[i] * (far - near)));
+        (grid.to_index(world.to_array().map(f64::from)), i)
+    });
+    shown.collect()
+}
+
+/// Those of every n-th row and column, the least n at which at most `most` remain; and n.
+fn thinned(shown: Vec<([f64; 3], usize)>, width: usize, most: usize) -> (usize, Vec<([f64; 3], usize)>) {
+    let kept = |n: usize| {
+        move |(_, pixel): &&([f64; 3], usize)| {
+            (pixel % width).is_multiple_of(n) && (pixel / width).is_multiple_of(n)
+        }
+    };
+    let mut n = 1;
+    while shown.iter().filter(kept(n)).count() > most {
+        n += 1;
+    }
+    (n, shown.iter().filter(kept(n)).copied().collect())
+}
+
+impl Known {
+    fn summary(&self) -> Truth {
+        Truth {
+            counting: self.reference.counting,
+            computed: self.reference.counts.iter().filter(|c| **c).count(),
+            surface: self.surface.len(),
+            convergence: self.reference.convergence.rmse,
+        }
+    }
+
+    /// A contender's errors, its runs still to come.
+    fn judge(
+        &self,
+        scene: &Scene,
+        subject: Subject,
+        entry: &Entry,
+        change: Change,
+        found: &Ambient,
+    ) -> Point {
+        let (of_surface, expected);
+        let (found, reference, counts, ssim_3d) = match found {
+            Ambient::Voxels(values) => {
+                let Reference { ambient, counts, .. } = &self.reference;
+                let ssim = ssim_3d(&scene.grid(), values, ambient, counts, Constants::PRINTED);
+                (values, ambient, counts.clone(), Some(ssim))
+            }
+            Ambient::Pixels(values) => {
+                debug_assert_eq!(values.len(), (subject.size[0] * subject.size[1]) as usize);
+                of_surface = self.surface.iter().map(|(_, pixel, _)| values[*pixel]).collect::<Vec<f32>>();
+                expected = self.surface.iter().map(|(.., value)| *value).collect::<Vec<f32>>();
+                let counts = vec![true; expected.len()];
+                (&of_surface, &expected, counts, None)
+            }
+        };
+        Point {
+            method: entry.method,
+            setting: entry.setting.clone(),
+            change,
+            on_surface: ssim_3d.is_none(),
+            errors: errors(found, reference, &counts),
+            shape: shape_errors(found, reference, &counts).0,
+            ssim_3d,
+            runs: Vec::new(),
+        }
+    }
+}
+
+impl Chart {
+    /// Whether a point's contender is the one that stands for its method in tables and pictures.
+    fn featured(&self, point: &Point) -> bool {
+        let mut shown = self.scenes.iter().flat_map(|scene| &scene.pictures);
+        shown.any(|shown| shown.method == point.method && shown.setting == point.setting)
+    }
+
+    /// What one has to know to read the chart, line by line.
+    pub fn caption(&self) -> Vec<String> {
+        let mut lines = vec![format!("{}, {}.", self.device, self.driver)];
+        for scene in &self.scenes {
+            let [x, y, z] = scene.dims;
+            let Some((_, truth)) = scene.references.first() else { continue };
+            lines.push(format!(
+                "{}: {x} x {y} x {z} voxels, radius {} mm, clip {}; errors at {} of {} voxels that show, or at {} points of the surface.",
+                scene.name, scene.radius_mm, scene.clips, truth.computed, truth.counting, truth.surface
+            ));
+        }
+        let worst = self.scenes.iter().flat_map(|s| &s.references).map(|(_, t)| t.convergence);
+        let reference = self.plan.reference;
+        lines.push(format!(
+            "Reference: {} directions, {} steps a voxel; doubling both moves it by {:.5} RMS at most. Medians of {} runs in one process, methods alternating; whiskers: quartiles.",
+            reference.directions,
+            reference.steps_per_voxel,
+            worst.fold(0.0, f64::max),
+            self.plan.runs
+        ));
+        lines.push(format!(
+            "Changes: clip moved by {CLIP_VOXELS} voxels, opacities and radius times {OPACITY_FACTOR} and {RADIUS_FACTOR}, or all values new, and back again. Copying a new volume to the device is not counted."
+        ));
+        lines.push(format!(
+            "Image space: {} x {} pixels an eye, both eyes; it has to be done again for every frame in which the head moves.",
+            self.plan.size[0], self.plan.size[1]
+        ));
+        lines
+    }
+}

@@ -1,0 +1,55 @@
+//! No ambient occlusion, the paper's "solid colour" (CAO §4): 1 everywhere, at no cost. What any method must beat.
+
+use super::rendered::{change_to, with_radius};
+use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject};
+use crate::Result;
+use crate::gpu::Timings;
+use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
+use crate::stage::eyes::Look;
+
+/// The one setting.
+pub fn entries(_: &Asked) -> Vec<Entry> {
+    vec![Entry {
+        method: "solid colour",
+        setting: Setting { label: "-".into(), quadrature: None, details: "ambient factor 1".into() },
+        work: 0.0,
+        open: Box::new(|subject, state| Ok(Box::new(Solid::open(subject, state)?))),
+    }]
+}
+
+struct Solid<'a> {
+    subject: Subject<'a>,
+    renderer: Renderer,
+    setup: Setup,
+}
+
+impl<'a> Solid<'a> {
+    fn open(subject: Subject<'a>, state: &State) -> Result<Self> {
+        // Without a neighbourhood nothing is occluded.
+        let setup = with_radius(Setup::paper(subject.volume.min_spacing()), 0.0);
+        let (transfer, volume) = (state.transfer.clone(), subject.volume);
+        let mut renderer = Renderer::new(subject.gpu, volume, transfer, setup, COLOUR)?;
+        renderer.set_clips(&state.clips)?;
+        renderer.update(&mut |_| ())?;
+        Ok(Self { subject, renderer, setup })
+    }
+}
+
+impl Contender for Solid<'_> {
+    fn update(&mut self, change: Change, state: &State) -> Result<Timings> {
+        let state = State { radius_mm: 0.0, ..state.clone() };
+        change_to(&mut self.renderer, self.setup, change, &state)?;
+        // What this brings up to date is the picture's opacity; there are no ambient values that could be late.
+        self.renderer.update(&mut |_| ())?;
+        Ok(Vec::new())
+    }
+
+    fn ambient(&self) -> Result<Ambient> {
+        Ok(Ambient::Voxels(vec![1.0; self.subject.volume.len()]))
+    }
+
+    fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
+        let look = Look { occluded: false, ..*look };
+        self.renderer.draw(self.subject.views, &look, self.subject.size)
+    }
+}
