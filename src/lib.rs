@@ -17,7 +17,7 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`error`] | what can go wrong, with the file, field, call or limit |
-//! | [`view`] [`transfer`] [`mesh`] [`occlusion`] [`clip`] [`scene`] | plain data: the eyes; opacity and colour; triangle meshes; how occlusion is computed; clip shapes and poses; the scene file |
+//! | [`view`] [`transfer`] [`mesh`] [`occlusion`] [`lattice`] [`clip`] [`scene`] | plain data: the eyes; opacity and colour; triangle meshes; how occlusion is computed; the directions of a sweep; clip shapes and poses; the scene file |
 //! | [`volume`] [`picture`] | files in: NRRD, NIfTI, MetaImage, raw, built-in volumes; files out: NRRD, PNG |
 //! | [`cpu`] | the truth: each numerical stage once more, the paper's equation in plain loops. For tests, not a fallback |
 //! | [`gpu`] | Vulkan and nothing else: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
@@ -82,6 +82,7 @@ pub mod clip;
 pub mod cpu;
 pub mod error;
 pub mod gpu;
+pub mod lattice;
 pub mod measure;
 pub mod mesh;
 pub mod method;

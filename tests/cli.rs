@@ -420,3 +420,25 @@ fn help_names_every_command_flag_and_default() {
         assert!(help.contains("Examples:"), "{command}");
     }
 }
+
+#[test]
+fn stability_writes_data_charts_and_one_page_with_all_of_them() {
+    let folder = Folder::with_device();
+    let answer = folder.json("stability --quick --only concave,anisotropy -o new/found");
+    assert_eq!(answer["good"], true, "{answer}");
+    let sweeps = answer["sweeps"].as_array().unwrap();
+    assert_eq!(sweeps.len(), 2);
+    let page = std::fs::read_to_string(folder.path("new/found/index.html")).unwrap();
+    assert_eq!(page.matches("<svg").count(), 2);
+    for sweep in sweeps {
+        let name = sweep["name"].as_str().unwrap();
+        assert_eq!((&sweep["ours"], &sweep["control_fails"]), (&"holds".into(), &true.into()), "{sweep}");
+        assert!(page.contains(sweep["sentence"].as_str().unwrap()), "{name}");
+        let file = |end: &str| std::fs::read(folder.path(&format!("new/found/{name}{end}"))).unwrap();
+        assert!(file("-1.png").starts_with(b"\x89PNG"));
+        assert!(String::from_utf8(file("-1.svg")).unwrap().contains("<svg"));
+        assert!(String::from_utf8(file(".csv")).unwrap().lines().count() > 5);
+    }
+    let list = folder.ok("stability --list");
+    assert_eq!(list.lines().count(), 10, "{list}");
+}

@@ -348,3 +348,12 @@ fn without_a_device_the_user_is_told_how_to_get_one() {
         refused(&folder, arguments, FAILURE, &["no Vulkan device answers", "install"]);
     }
 }
+
+#[test]
+fn stability_asks_for_a_folder_and_for_sweeps_that_there_are() {
+    let folder = Folder::without_device();
+    folder.put("taken", "a file");
+    refused(&folder, "stability", USAGE, &["--output"]);
+    refused(&folder, "stability -o out --only colour", USAGE, &["colour", "stereo, motion"]);
+    refused(&folder, "stability -o taken", FAILURE, &["taken", "it is a file"]);
+}

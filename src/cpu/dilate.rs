@@ -34,10 +34,7 @@ pub struct DilationMap {
 impl DilationMap {
     /// Whether a point of the mesh's rigid frame (mm) may be within the radius of the region that the clip hides.
     pub fn dilated(&self, rigid: Vec3) -> bool {
-        let p = self.camera.map(rigid);
-        let between =
-            self.camera.pixel(p).is_some_and(|cell| self.front[cell] < p.z && p.z < self.back[cell]);
-        between == (self.mode == Mode::Remove)
+        holds(&self.camera, self.mode, rigid, |cell| [self.front[cell], self.back[cell]])
     }
 }
 
@@ -48,31 +45,46 @@ pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
     (f64::from(reach_mm) + (1.5 + 1e-2) * grid.diagonal()) as f32
 }
 
-/// The conservative map with `resolution` cells along an edge.
-///
-/// # Errors
-/// [`Error::Config`] when `resolution` is below 4.
-pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution: u32) -> Result<DilationMap> {
-    if resolution < 4 {
-        return Err(Error::Config {
-            what: "dilation map resolution".into(),
-            problem: format!("{resolution}; expected at least 4"),
-        });
-    }
-    let camera = layers.camera.widened(radius_mm, resolution);
-    let (side, fine) = (resolution as usize, layers.camera.resolution as usize);
-    // Pixels that a row or column of cells touches, with a thousandth of a pixel for rounding; `None` where some lie
-    // beyond the layers.
-    let (cell, pixel) = (f64::from(camera.pixel_mm), f64::from(layers.camera.pixel_mm));
-    let touched = |shift: f32, index: usize| {
-        let from = (f64::from(shift) + index as f64 * cell) / pixel - 1e-3;
-        let to = (f64::from(shift) + (index + 1) as f64 * cell) / pixel + 1e-3;
-        let range = from.floor().max(0.0) as usize..((to.floor() + 1.0).max(0.0) as usize).min(fine);
-        (range, from < 0.0 || to >= fine as f64)
-    };
-    let shift = camera.corner - layers.camera.corner;
-    let cells: Vec<[f64; 2]> = (0..side * side)
-        .map(|cell| {
+/// A dilation map of which each cell is computed when it is asked for: of the largest maps the few cells that matter take seconds,
+/// the whole minutes.
+#[derive(Clone, Debug)]
+pub struct Cells {
+    camera: ClipCamera,
+    mode: Mode,
+    /// D_front is the least of front − h for a clip that removes, and the most of front + h, the least of −front − h with its
+    /// sign turned, for one that keeps; D_back the other way round.
+    front: Envelope,
+    back: Envelope,
+    /// For each |dy| the half-heights of the ball over dx = −n … n, as far as it reaches.
+    heights: Vec<Vec<f64>>,
+    half: bool,
+}
+
+impl Cells {
+    /// The conservative map with `resolution` cells along an edge.
+    ///
+    /// # Errors
+    /// [`Error::Config`] when `resolution` is below 4.
+    pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution: u32) -> Result<Self> {
+        if resolution < 4 {
+            return Err(Error::Config {
+                what: "dilation map resolution".into(),
+                problem: format!("{resolution}; expected at least 4"),
+            });
+        }
+        let camera = layers.camera.widened(radius_mm, resolution);
+        let (side, fine) = (resolution as usize, layers.camera.resolution as usize);
+        // Pixels that a row or column of cells touches, with a thousandth of a pixel for rounding; `None` where some lie
+        // beyond the layers.
+        let (cell, pixel) = (f64::from(camera.pixel_mm), f64::from(layers.camera.pixel_mm));
+        let touched = |shift: f32, index: usize| {
+            let from = (f64::from(shift) + index as f64 * cell) / pixel - 1e-3;
+            let to = (f64::from(shift) + (index + 1) as f64 * cell) / pixel + 1e-3;
+            let range = from.floor().max(0.0) as usize..((to.floor() + 1.0).max(0.0) as usize).min(fine);
+            (range, from < 0.0 || to >= fine as f64)
+        };
+        let shift = camera.corner - layers.camera.corner;
+        let cells = (0..side * side).map(|cell| {
             let (columns, past_x) = touched(shift.x, cell % side);
             let (rows, past_y) = touched(shift.y, cell / side);
             if mode == Mode::Keep && (past_x || past_y) {
@@ -80,40 +92,186 @@ pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution:
             }
             let pixels = rows.flat_map(|y| columns.clone().map(move |x| y * fine + x));
             merge(mode, pixels.map(|pixel| interval(layers, mode, pixel)))
-        })
-        .collect();
-    let (radius, cell_mm) = (f64::from(radius_mm), f64::from(camera.pixel_mm));
-    let height = |dx: usize, dy: usize| {
-        let gap = |d: usize| d.saturating_sub(1) as f64 * cell_mm;
-        let square = radius * radius - gap(dx).powi(2) - gap(dy).powi(2);
-        (square >= 0.0).then(|| square.sqrt() / f64::from(camera.depth_mm))
-    };
-    let span = (radius / cell_mm) as usize + 1;
-    Ok(spread(camera, mode, &cells, span, height))
+        });
+        let (radius, cell_mm) = (f64::from(radius_mm), f64::from(camera.pixel_mm));
+        let height = |dx: usize, dy: usize| {
+            let gap = |d: usize| d.saturating_sub(1) as f64 * cell_mm;
+            let square = radius * radius - gap(dx).powi(2) - gap(dy).powi(2);
+            (square >= 0.0).then(|| square.sqrt() / f64::from(camera.depth_mm))
+        };
+        Ok(Self::new(camera, mode, cells, (radius / cell_mm) as usize + 1, height, false))
+    }
+
+    /// The paper's map: at the layers' resolution, from pixel centre to pixel centre, radius in pixels; depths rounded to
+    /// half floats if `half`. Empty pixels are skipped, which is more careful than dilating their stored depth.
+    pub fn literal(layers: &MeshLayers, mode: Mode, radius_mm: f32, half: bool) -> Self {
+        let camera = layers.camera;
+        let stored = |depth: f64| if half { round_to_half(depth) } else { depth };
+        let side = camera.resolution as usize;
+        let pixels = (0..side * side).map(|pixel| interval(layers, mode, pixel).map(stored));
+        let r_xy = f64::from(radius_mm / camera.pixel_mm);
+        let r_z = f64::from(radius_mm / camera.depth_mm);
+        let height = |dx: usize, dy: usize| {
+            let square = 1.0 - (dx * dx + dy * dy) as f64 / (r_xy * r_xy);
+            (square >= 0.0).then(|| r_z * square.sqrt())
+        };
+        Self::new(camera, mode, pixels, r_xy as usize, height, half)
+    }
+
+    /// Intervals of cells, to be grown (remove) or shrunk (keep) by those of all cells within `span`, where
+    /// `height(|dx|, |dy|)` is the half-height of the ball at that distance.
+    fn new(
+        camera: ClipCamera,
+        mode: Mode,
+        cells: impl Iterator<Item = [f64; 2]>,
+        span: usize,
+        height: impl Fn(usize, usize) -> Option<f64>,
+        half: bool,
+    ) -> Self {
+        let side = camera.resolution as usize;
+        let sign = sign(mode);
+        // Where a clip that removes has nothing, nothing is reached.
+        let skipped = |cell| if mode == Mode::Remove && cell == EMPTY { NOWHERE } else { cell };
+        let (front, back) = cells.map(skipped).map(|[front, back]| (sign * front, -sign * back)).unzip();
+        let (front, back) = (Envelope::new(side, front), Envelope::new(side, back));
+        let row = |dy: usize| {
+            let right: Vec<f64> = (0..=span).map_while(|dx| height(dx, dy)).collect();
+            right.iter().skip(1).rev().chain(&right).copied().collect()
+        };
+        Self { camera, mode, front, back, heights: (0..=span).map(row).collect(), half }
+    }
+
+    /// D_front and D_back of one cell. Beyond the map everything is empty.
+    fn cell(&self, cell: usize) -> [f32; 2] {
+        let side = self.camera.resolution as usize;
+        let (x, y) = (cell % side, cell / side);
+        let span = self.heights.len() - 1;
+        let past_edge = |c: usize| c < span || c + span >= side;
+        if self.mode == Mode::Keep && (past_edge(x) || past_edge(y)) {
+            return EMPTY.map(|depth| self.stored(depth));
+        }
+        let sign = sign(self.mode);
+        let front = sign * self.front.least(x, y, &self.heights);
+        let back = -sign * self.back.least(x, y, &self.heights);
+        let found = if [front, back] == NOWHERE { EMPTY } else { [front, back] };
+        found.map(|depth| self.stored(depth))
+    }
+
+    fn stored(&self, depth: f64) -> f32 {
+        // Through f32, which a depth map holds before it is stored in 16 bits.
+        let depth = depth as f32;
+        if self.half { round_to_half(f64::from(depth)) as f32 } else { depth }
+    }
+
+    /// Whether a point of the mesh's rigid frame (mm) may be within the radius of the region that the clip hides.
+    pub fn dilated(&self, rigid: Vec3) -> bool {
+        holds(&self.camera, self.mode, rigid, |cell| self.cell(cell))
+    }
+
+    /// All cells.
+    pub fn whole(&self) -> DilationMap {
+        let side = self.camera.resolution as usize;
+        let intervals = each(side * side, |cell| self.cell(cell));
+        DilationMap {
+            camera: self.camera,
+            mode: self.mode,
+            front: intervals.iter().map(|i| i[0]).collect(),
+            back: intervals.iter().map(|i| i[1]).collect(),
+        }
+    }
 }
 
-/// The paper's map: at the layers' resolution, from pixel centre to pixel centre, radius in pixels; depths rounded to
-/// half floats if `half`. Empty pixels are skipped, which is more careful than dilating their stored depth.
-pub fn literal(layers: &MeshLayers, mode: Mode, radius_mm: f32, half: bool) -> DilationMap {
-    let camera = layers.camera;
-    let stored = |depth: f64| if half { round_to_half(depth) } else { depth };
-    let side = camera.resolution as usize;
-    let pixels: Vec<[f64; 2]> =
-        (0..side * side).map(|pixel| interval(layers, mode, pixel).map(stored)).collect();
-    let r_xy = f64::from(radius_mm / camera.pixel_mm);
-    let r_z = f64::from(radius_mm / camera.depth_mm);
-    let height = |dx: usize, dy: usize| {
-        let square = 1.0 - (dx * dx + dy * dy) as f64 / (r_xy * r_xy);
-        (square >= 0.0).then(|| r_z * square.sqrt())
-    };
-    let mut map = spread(camera, mode, &pixels, r_xy as usize, height);
-    for depth in map.front.iter_mut().chain(&mut map.back) {
-        *depth = stored(f64::from(*depth)) as f32;
+/// A removing clip's interval grows, a keeping one's shrinks.
+fn sign(mode: Mode) -> f64 {
+    if mode == Mode::Remove { 1.0 } else { -1.0 }
+}
+
+/// A square of values, and the least of each block of them, which tells the blocks that need not be looked at.
+#[derive(Clone, Debug)]
+struct Envelope {
+    side: usize,
+    values: Vec<f64>,
+    least: Vec<f64>,
+}
+
+/// Cells along an edge of an [`Envelope`]'s blocks.
+const BLOCK: usize = 16;
+
+impl Envelope {
+    fn new(side: usize, values: Vec<f64>) -> Self {
+        let blocks = side.div_ceil(BLOCK);
+        let mut least = vec![f64::INFINITY; blocks * blocks];
+        for (cell, &value) in values.iter().enumerate() {
+            let slot = &mut least[cell / side / BLOCK * blocks + cell % side / BLOCK];
+            *slot = slot.min(value);
+        }
+        Self { side, values, least }
     }
-    map
+
+    /// The least of value − height over the cells around (x, y); `heights[|dy|]` is for dx = −n … n and nowhere grows with |dx| or |dy|.
+    fn least(&self, x: usize, y: usize, heights: &[Vec<f64>]) -> f64 {
+        let span = heights.len() - 1;
+        let blocks = self.side.div_ceil(BLOCK);
+        let reached = |c: usize| c.saturating_sub(span) / BLOCK..=((c + span) / BLOCK).min(blocks - 1);
+        let gap = |c: usize, block: usize| {
+            let first = block * BLOCK;
+            first.saturating_sub(c).max(c.saturating_sub(first + BLOCK - 1))
+        };
+        // Its own block first, so that few others can hold less.
+        let mut least = self.least_in(x / BLOCK, y / BLOCK, x, y, heights, f64::INFINITY);
+        for v in reached(y) {
+            let row = &heights[gap(y, v)];
+            for u in reached(x) {
+                // The block's highest ball is the one nearest to (x, y).
+                let highest = row.get(row.len() / 2 + gap(x, u));
+                if highest.is_some_and(|h| self.least[v * blocks + u] - h < least) {
+                    least = self.least_in(u, v, x, y, heights, least);
+                }
+            }
+        }
+        least
+    }
+
+    fn least_in(&self, u: usize, v: usize, x: usize, y: usize, heights: &[Vec<f64>], mut least: f64) -> f64 {
+        for j in v * BLOCK..((v + 1) * BLOCK).min(self.side) {
+            let Some(row) = heights.get(j.abs_diff(y)) else { continue };
+            let reach = row.len() / 2;
+            for i in u * BLOCK..((u + 1) * BLOCK).min(self.side) {
+                if i.abs_diff(x) <= reach && !row.is_empty() {
+                    least = least.min(self.values[j * self.side + i] - row[i + reach - x]);
+                }
+            }
+        }
+        least
+    }
+}
+
+/// Whether the interval of the cell that a point falls into contains it, for a clip that removes; or does not, for one that keeps.
+fn holds(camera: &ClipCamera, mode: Mode, rigid: Vec3, interval: impl Fn(usize) -> [f32; 2]) -> bool {
+    let p = camera.map(rigid);
+    let between = camera.pixel(p).is_some_and(|cell| {
+        let [front, back] = interval(cell);
+        front < p.z && p.z < back
+    });
+    between == (mode == Mode::Remove)
+}
+
+/// All cells of [`Cells::conservative`].
+///
+/// # Errors
+/// [`Error::Config`] when `resolution` is below 4.
+pub fn conservative(layers: &MeshLayers, mode: Mode, radius_mm: f32, resolution: u32) -> Result<DilationMap> {
+    Ok(Cells::conservative(layers, mode, radius_mm, resolution)?.whole())
+}
+
+/// All cells of [`Cells::literal`].
+pub fn literal(layers: &MeshLayers, mode: Mode, radius_mm: f32, half: bool) -> DilationMap {
+    Cells::literal(layers, mode, radius_mm, half).whole()
 }
 
 const EMPTY: [f64; 2] = [NO_FRONT as f64, NO_BACK as f64];
+/// An interval that no ball grows into one that holds anything.
+const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 /// The one interval that stands for all pairs of a pixel: their hull for a clip that removes, their common part for
 /// one that keeps, which a gap between pairs leaves empty.
@@ -130,40 +288,6 @@ fn merge(mode: Mode, intervals: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
             Mode::Keep => [a[0].max(b[0]), a[1].min(b[1])],
         })
         .unwrap_or(EMPTY)
-}
-
-/// Grows (remove) or shrinks (keep) the interval of each cell by those of all cells within `span`, where
-/// `height(|dx|, |dy|)` is the half-height of the ball at that distance. Beyond the map everything is empty.
-fn spread(
-    camera: ClipCamera,
-    mode: Mode,
-    cells: &[[f64; 2]],
-    span: usize,
-    height: impl Fn(usize, usize) -> Option<f64>,
-) -> DilationMap {
-    let side = camera.resolution as usize;
-    let heights: Vec<Option<f64>> =
-        (0..=span).flat_map(|dy| (0..=span).map(move |dx| (dx, dy))).map(|(dx, dy)| height(dx, dy)).collect();
-    let sign = if mode == Mode::Remove { 1.0 } else { -1.0 };
-    let intervals = each(cells.len(), |cell| {
-        let (x, y) = (cell % side, cell / side);
-        let near = |c: usize| c.saturating_sub(span)..=(c + span).min(side - 1);
-        let past_edge = |c: usize| c < span || c + span >= side;
-        let start = if mode == Mode::Keep && (past_edge(x) || past_edge(y)) { Some(EMPTY) } else { None };
-        let reached = near(y).flat_map(|j| near(x).map(move |i| (i, j))).filter_map(|(i, j)| {
-            let [front, back] = cells[j * side + i];
-            let empty = [front, back] == EMPTY;
-            let h = heights[j.abs_diff(y) * (span + 1) + i.abs_diff(x)]?;
-            (mode == Mode::Keep || !empty).then_some([front - sign * h, back + sign * h])
-        });
-        merge(mode, start.into_iter().chain(reached)).map(|depth| depth as f32)
-    });
-    DilationMap {
-        camera,
-        mode,
-        front: intervals.iter().map(|i| i[0]).collect(),
-        back: intervals.iter().map(|i| i[1]).collect(),
-    }
 }
 
 /// Nearest IEEE half float, ties to even; the depths here are far from its limits.
@@ -240,6 +364,35 @@ mod tests {
                 !map.dilated(nearby(p, radius, &mut random))
             })
             .count()
+    }
+
+    /// Blocks that are not looked at hold nothing less.
+    #[test]
+    fn the_envelope_is_the_least_of_all_cells_in_reach() {
+        let mut random = Random(5);
+        for (side, radius) in [(1, 3.0), (16, 2.5), (37, 40.0), (50, 17.3), (64, 6.0)] {
+            let values: Vec<f64> = (0..side * side)
+                .map(
+                    |_| if random.unit() < 0.4 { f64::INFINITY } else { f64::from(random.within(-9.0, 9.0)) },
+                )
+                .collect();
+            let height = |dx: usize, dy: usize| {
+                let square = radius * radius - (dx * dx + dy * dy) as f64;
+                (square >= 0.0).then(|| square.sqrt())
+            };
+            let camera =
+                ClipCamera { corner: Vec3::ZERO, pixel_mm: 1.0, depth_mm: 1.0, resolution: side as u32 };
+            let cells = values.iter().map(|&v| [v, -v]);
+            let made = Cells::new(camera, Mode::Remove, cells, radius as usize, height, false);
+            for _ in 0..60 {
+                let [x, y] = [(); 2].map(|()| (random.unit() * side as f32) as usize);
+                let all = (0..side * side).filter_map(|cell: usize| {
+                    let h = height((cell % side).abs_diff(x), (cell / side).abs_diff(y))?;
+                    Some(values[cell] - h)
+                });
+                assert_eq!(made.front.least(x, y, &made.heights), all.fold(f64::INFINITY, f64::min));
+            }
+        }
     }
 
     #[test]

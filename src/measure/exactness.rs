@@ -8,7 +8,7 @@ use crate::gpu::Timings;
 use crate::renderer::{Categories, Renderer};
 use crate::stage::compare::Difference;
 use crate::stage::eyes::Look;
-use crate::view::StereoRig;
+use crate::view::{StereoRig, View};
 use glam::Vec3;
 
 /// What is tried.
@@ -182,8 +182,12 @@ pub fn compare_eyes(renderer: &Renderer, random: &mut Random) -> Result<Stereo> 
     let size: [f64; 3] = std::array::from_fn(|i| f64::from(field.dims[i] as f32 * field.spacing[i]));
     let rig = StereoRig::framing(size, random.between(0.0, 360.0), random.between(-80.0, 80.0));
     let far = 4.0 * (rig.position - rig.target).length();
-    let views = rig.views(1.0, far * 1e-3, far)?;
+    compare_views(renderer, &rig.views(1.0, far * 1e-3, far)?, random)
+}
 
+/// The same for given eyes.
+pub fn compare_views(renderer: &Renderer, views: &[View; 2], random: &mut Random) -> Result<Stereo> {
+    let field = renderer.field();
     let opacity = renderer.read_opacity()?;
     let mut points = Vec::new();
     let [x, y, _] = field.dims.map(|d| d as usize);
@@ -204,7 +208,7 @@ pub fn compare_eyes(renderer: &Renderer, random: &mut Random) -> Result<Stereo> 
         }
     }
     let mut stereo = Stereo::default();
-    for [left, right] in renderer.seen_by_both(&views, &Look::default(), &points)? {
+    for [left, right] in renderer.seen_by_both(views, &Look::default(), &points)? {
         if left.transmittance >= SEEN && right.transmittance >= SEEN {
             stereo.points += 1;
             if left.ambient.to_bits() != right.ambient.to_bits() {

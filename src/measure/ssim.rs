@@ -10,6 +10,7 @@
 //! * the window: here Wang's, a Gaussian of σ = 1.5 voxels cut at 11, as the authors' published program has it;
 //! * its rim: here only voxels that count have weight, in every window, and only their own windows are averaged. The authors'
 //!   program drops the 5 outermost voxels instead;
+//! * values below 0, of voxels whose structures are opposed: here kept; the authors' program takes them for 0;
 //! * the constants: c1 = 0.01 and c2 = 0.03 as printed, while that program squares them as Wang does. See [`Constants`].
 
 use crate::cpu::Grid;
@@ -161,5 +162,43 @@ mod tests {
         let flat = ssim_2d(&grid, &found, &reference, &all, Constants::SQUARED);
         let deep = ssim_3d(&grid, &found, &reference, &all, Constants::SQUARED);
         assert!(flat > 0.95 && deep < 0.2, "{flat} {deep}");
+    }
+
+    /// Every window summed by itself, straight from the definition.
+    #[test]
+    fn windows_are_those_of_the_definition() {
+        let grid = Grid { dims: [14, 7, 9], spacing: [1.0; 3] };
+        let mut random = Random::new(8);
+        let mut field = || (0..grid.len()).map(|_| random.between(0.0, 1.0)).collect::<Vec<f32>>();
+        let (p, t) = (field(), field());
+        let counts: Vec<bool> = field().into_iter().map(|c| c > 0.3).collect();
+        let Constants { c1, c2 } = Constants::SQUARED;
+        for (deep, ssim) in [
+            (false, ssim_2d(&grid, &p, &t, &counts, Constants::SQUARED)),
+            (true, ssim_3d(&grid, &p, &t, &counts, Constants::SQUARED)),
+        ] {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for i in (0..grid.len()).filter(|i| counts[*i]) {
+                let weight = |j: &usize| {
+                    let apart: [usize; 3] =
+                        std::array::from_fn(|a| grid.voxel(i)[a].abs_diff(grid.voxel(*j)[a]));
+                    let inside = apart.iter().all(|d| *d <= 5) && (deep || apart[2] == 0) && counts[*j];
+                    let squares = apart.iter().map(|d| (d * d) as f64).sum::<f64>();
+                    if inside { (-squares / (2.0 * 1.5 * 1.5)).exp() } else { 0.0 }
+                };
+                let total: f64 = (0..grid.len()).map(|j| weight(&j)).sum();
+                let mean = |of: &dyn Fn(usize) -> f64| {
+                    (0..grid.len()).map(|j| weight(&j) / total * of(j)).sum::<f64>()
+                };
+                let [p, t] = [&p, &t].map(|f| move |j: usize| f64::from(f[j]));
+                let (mp, mt) = (mean(&p), mean(&t));
+                let vp = mean(&|j| (p(j) - mp).powi(2));
+                let vt = mean(&|j| (t(j) - mt).powi(2));
+                let c = mean(&|j| (p(j) - mp) * (t(j) - mt));
+                sum += (2.0 * mp * mt + c1) / (mp * mp + mt * mt + c1) * (2.0 * c + c2) / (vp + vt + c2);
+                count += 1.0;
+            }
+            close(ssim, sum / count);
+        }
     }
 }

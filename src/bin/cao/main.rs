@@ -1,6 +1,7 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+mod budget;
 mod chart;
 #[path = "../common/mod.rs"]
 mod common;
@@ -8,6 +9,7 @@ mod devices;
 mod info;
 mod occlusion;
 mod render;
+mod stability;
 mod verify;
 
 use clap::{CommandFactory, FromArgMatches};
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
         args::Command::Occlusion(a) => occlusion::run(&cli.global, a, of_command),
         args::Command::Verify(a) => verify::run(&cli.global, a),
         args::Command::Chart(a) => chart::run(&cli.global, a),
+        args::Command::Stability(a) => stability::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };

@@ -1,0 +1,281 @@
+//! Where methods fail (measure.md §4): one sweep for each way, from the range where it holds through the one where it does
+//! not, ours in the same run.
+//!
+//! A sweep has a plan (sizes, values of its parameter), and finds a [`Finding`]: the curves, and one sentence that says what
+//! failed at which value, made from the numbers alone. A sweep in which nothing fails shows nothing, so that each
+//! carries its own control: a method that is known to fail there.
+
+pub mod anisotropy;
+pub mod concave;
+pub mod cut;
+pub mod dilation;
+pub mod motion;
+pub mod numbers;
+pub mod page;
+mod plane_cut;
+pub mod radius;
+pub mod sheets;
+pub mod stereo;
+pub mod views;
+
+use crate::Result;
+use crate::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
+use crate::gpu::Gpu;
+use crate::stage::peel::Layers;
+
+/// How long a sweep may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// A fraction of a minute each, on two cores: the sizes that the charts are meant for.
+    Full,
+    /// Seconds each: fewer and coarser steps over the same ranges.
+    Quick,
+}
+
+/// Whether a curve is ours, a method that the sweep is there to catch, or a yardstick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// This program, as it is used.
+    Ours,
+    /// A method that fails.
+    Control,
+}
+
+/// One curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// What it shows.
+    pub name: String,
+    /// Whose it is.
+    pub role: Role,
+    /// (parameter, measured), ascending.
+    pub points: Vec<[f64; 2]>,
+}
+
+impl Series {
+    /// Ours.
+    pub fn ours(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), role: Role::Ours, points }
+    }
+
+    /// What fails.
+    pub fn control(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), role: Role::Control, points }
+    }
+
+    /// Largest measured value; 0 of nothing.
+    pub fn largest(&self) -> f64 {
+        self.points.iter().fold(0.0, |most, point| point[1].max(most))
+    }
+
+    /// Measured value where the parameter is nearest to `x`; NaN of nothing.
+    pub fn at(&self, x: f64) -> f64 {
+        let nearest = self.points.iter().min_by(|a, b| (a[0] - x).abs().total_cmp(&(b[0] - x).abs()));
+        nearest.map_or(f64::NAN, |point| point[1])
+    }
+}
+
+/// What an axis of a chart shows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// What and in which unit.
+    pub label: String,
+    /// Equal factors have equal lengths.
+    pub log: bool,
+}
+
+impl Quantity {
+    /// Equal differences have equal lengths.
+    pub fn linear(label: impl Into<String>) -> Self {
+        Self { label: label.into(), log: false }
+    }
+
+    /// Equal factors have equal lengths.
+    pub fn log(label: impl Into<String>) -> Self {
+        Self { label: label.into(), log: true }
+    }
+}
+
+/// Curves over one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chart {
+    /// What is asked.
+    pub title: String,
+    /// The parameter.
+    pub x: Quantity,
+    /// What is measured.
+    pub y: Quantity,
+    /// The curves.
+    pub series: Vec<Series>,
+}
+
+/// What a sweep says about ours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ours {
+    /// It does over the whole range what it claims.
+    Holds,
+    /// The method itself ends here, and so does ours; the sweep shows where.
+    Limited,
+    /// It does not do what it claims.
+    Fails,
+}
+
+impl Ours {
+    /// Holds if it does.
+    pub fn holding(does: bool) -> Self {
+        if does { Self::Holds } else { Self::Fails }
+    }
+
+    /// `holds`, `limited`, `fails`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::Limited => "limited",
+            Self::Fails => "fails",
+        }
+    }
+}
+
+/// What a sweep found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// The curves.
+    pub charts: Vec<Chart>,
+    /// What failed and at which value.
+    pub sentence: String,
+    /// Whether ours did.
+    pub ours: Ours,
+    /// Whether the control failed, as it must: else the sweep could not have caught anything.
+    pub control_fails: bool,
+    /// What was computed: sizes and settings.
+    pub setting: String,
+}
+
+/// Runs a sweep, telling the share done (0 … 1). Uses the device's queue and waits for it.
+pub type Run = fn(&Gpu, Effort, &mut dyn FnMut(f64)) -> Result<Finding>;
+
+/// A sweep by its name.
+#[derive(Clone, Copy)]
+pub struct Sweep {
+    /// On the command line.
+    pub name: &'static str,
+    /// What it asks.
+    pub title: &'static str,
+    /// Runs it.
+    pub run: Run,
+}
+
+/// Every sweep, in the order of measure.md §4.
+pub const SWEEPS: [Sweep; 10] = [
+    Sweep {
+        name: "stereo",
+        title: "Do both eyes see the same shading?",
+        run: |gpu, effort, progress| stereo::run(gpu, &stereo::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "motion",
+        title: "Does a clip that moves slowly pop, and when has a frame settled?",
+        run: |gpu, effort, progress| motion::run(gpu, &motion::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "dilation",
+        title: "Which dilation map leaves voxels stale?",
+        run: |gpu, effort, progress| dilation::run(gpu, &dilation::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "concave",
+        title: "What is cut wrongly when a concave clip has too few depth layers?",
+        run: |gpu, effort, progress| concave::run(gpu, &concave::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "cut",
+        title: "How wrong is the shading of a cut face?",
+        run: |gpu, effort, progress| cut::run(gpu, &cut::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "radius",
+        title: "How dark do inner layers become as the radius grows?",
+        run: |_, effort, progress| radius::run(&radius::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "sheets",
+        title: "How much occlusion of thin sheets do directions and steps miss?",
+        run: |_, effort, progress| sheets::run(&sheets::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "anisotropy",
+        title: "Does the shading depend on which way a scene lies on anisotropic voxels?",
+        run: |_, effort, progress| anisotropy::run(&anisotropy::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "numbers",
+        title: "Do extreme and impossible numbers give a defined result or a clear error?",
+        run: |gpu, effort, progress| numbers::run(gpu, &numbers::Plan::of(effort), progress),
+    },
+    Sweep {
+        name: "views",
+        title: "Do odd eyes see holes, or each another picture?",
+        run: |gpu, effort, progress| views::run(gpu, &views::Plan::of(effort), progress),
+    },
+];
+
+impl Sweep {
+    /// The sweep called `name`.
+    pub fn parse(name: &str) -> Result<Self> {
+        SWEEPS.into_iter().find(|sweep| sweep.name == name).ok_or_else(|| crate::Error::Config {
+            what: "sweep".into(),
+            problem: format!("\"{name}\" is none; there are {}", SWEEPS.map(|sweep| sweep.name).join(", ")),
+        })
+    }
+}
+
+/// The device's depth layers in the form of the twins', whose empty pixels hide nothing.
+impl From<&Layers> for MeshLayers {
+    fn from(layers: &Layers) -> Self {
+        let pixels = (layers.camera.resolution * layers.camera.resolution) as usize;
+        let map = |side: usize, none: f32| -> Vec<Vec<f32>> {
+            let of = |map: &[f32]| map.iter().map(|&z| if z < 1.0 { z } else { none }).collect();
+            layers.depth.chunks(pixels).skip(side).step_by(2).map(of).collect()
+        };
+        Self { camera: layers.camera, front: map(0, NO_FRONT), back: map(1, NO_BACK) }
+    }
+}
+
+/// `count` numbers from `low` to `high`, both included.
+fn evenly(low: f64, high: f64, count: usize) -> Vec<f64> {
+    (0..count).map(|i| low + (high - low) * i as f64 / (count - 1).max(1) as f64).collect()
+}
+
+/// Mean; 0 of nothing.
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The value below which `share` of the values lie; 0 of nothing.
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = (share * (sorted.len().max(1) - 1) as f64).round() as usize;
+    sorted.get(place).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_and_means_are_of_the_values() {
+        let values: Vec<f64> = (0..101).rev().map(f64::from).collect();
+        assert_eq!((mean(&values), quantile(&values, 0.99), quantile(&values, 0.0)), (50.0, 99.0, 0.0));
+        assert_eq!((mean(&[]), quantile(&[], 0.5)), (0.0, 0.0));
+        assert_eq!(evenly(0.0, 1.0, 3), [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn sweeps_have_names_of_their_own() {
+        for sweep in SWEEPS {
+            assert_eq!(Sweep::parse(sweep.name).unwrap().title, sweep.title);
+        }
+        assert!(Sweep::parse("colour").is_err_and(|e| e.to_string().contains("stereo, motion")));
+    }
+}

@@ -1,0 +1,245 @@
+//! Clip motion (CAO §3.5 step 4, measure.md §4): how much a cut face's shading jumps when the clip moves by a part of a voxel, and
+//! how long it takes to settle when the clip stops.
+//!
+//! A plane along the voxels' own axes, the hardest case: all voxels of the cut change in the same frame. The finest steps are computed,
+//! coarser ones are frames left out. Control of the jumps: N = 0, no anti-aliasing samples (CAO eq. (5)). Control of settling:
+//! progressive LAO, which recomputes one part of the slices a frame and shows the rest as it was.
+
+use super::plane_cut::PlaneCut;
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
+use crate::Result;
+use crate::cpu::trilinear_clamped;
+use crate::gpu::Gpu;
+use crate::measure::plot::short;
+use crate::occlusion::{Occlusion, Quadrature, RaySet};
+use crate::renderer::Setup;
+use crate::stage::classify::AntiAliasing;
+use crate::stage::eyes::Look;
+use glam::Vec3;
+
+/// Sizes and values of the sweep.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Voxels along an edge of the volume.
+    pub edge: usize,
+    /// Pixels along an edge of the picture.
+    pub pixels: u32,
+    /// Frames that the plane takes for a voxel, a power of two.
+    pub frames: usize,
+    /// Voxels that it goes.
+    pub way: usize,
+}
+
+impl Plan {
+    /// The plan for this effort.
+    pub fn of(effort: Effort) -> Self {
+        match effort {
+            Effort::Full => Self { edge: 48, pixels: 192, frames: 32, way: 2 },
+            Effort::Quick => Self { edge: 32, pixels: 96, frames: 8, way: 1 },
+        }
+    }
+}
+
+/// Radius in voxels.
+const RADIUS: f32 = 6.0;
+
+/// A progressive method recomputes one slice in so many a frame.
+const PARTS: usize = 8;
+
+/// Frames that the clip moves for before it stops, in the part on settling; and frames looked at after that.
+const MOVES: usize = 6;
+const RESTS: usize = 12;
+
+/// A frame has settled when nothing is off by more than this: half a step of an 8-bit display at twice the ambient factor.
+pub const SETTLED: f64 = 0.5 / 255.0 / 2.0;
+
+/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
+    let frames = plan.frames * plan.way + 1;
+    let total = (3 * frames + MOVES + RESTS) as f64;
+    let mut done = 0.0;
+    let mut tick = || {
+        done += 1.0;
+        progress(done / total);
+    };
+    let occlusion = Occlusion {
+        rays: RaySet::R14,
+        quadrature: Quadrature::Left,
+        radius_mm: RADIUS,
+        offset_mm: None,
+        step_mm: None,
+    };
+    let (mut ambient, mut picture) = (Vec::new(), Vec::new());
+    let mut stage = PlaneCut::new(gpu, plan.edge, occlusion, plan.way)?;
+    for (samples, name) in [(AntiAliasing::N0, 0), (AntiAliasing::N8, 8), (AntiAliasing::N32, 32)] {
+        {
+            let setup = Setup { anti_aliasing: samples, ..*stage.renderer.setup() };
+            stage.renderer.set_setup(setup)?;
+        };
+        let mut seen = Vec::new();
+        for frame in 0..frames {
+            seen.push(shown(&mut stage, frame as f64 / plan.frames as f64, plan.pixels)?);
+            tick();
+        }
+        let curve = |of: fn(&Frame) -> &Vec<f64>| jumps(&seen, plan.frames, of);
+        let series = |points| match name {
+            0 => Series::control("N = 0", points),
+            n => Series::ours(format!("N = {n}{}", if n == 32 { " (ours)" } else { "" }), points),
+        };
+        ambient.push(series(curve(|frame| &frame.ambient)));
+        picture.push(series(curve(|frame| &frame.light)));
+    }
+    let settling = settle(&mut stage, &mut tick)?;
+
+    let finest = 1.0 / plan.frames as f64;
+    let ratio = ambient[0].at(finest) / ambient[2].at(finest).max(1e-12);
+    let holds = settling.ours_frames == 0 && settling.different == 0;
+    let says = match holds {
+        true => format!(
+            "ours has settled in the very frame, bit for bit, while progressive LAO takes {} more",
+            settling.progressive_frames
+        ),
+        false => {
+            format!("OURS takes {} more frames, {} voxels differ", settling.ours_frames, settling.different)
+        }
+    };
+    Ok(Finding {
+        sentence: format!(
+            "Without anti-aliasing samples the cut face's ambient factor jumps by {} in a step of {} voxel (the picture's light by {}), \
+             {}× as much as with N = 32 ({}; N = 8: {}), though over a whole voxel it changes by {} only; when the clip stops, {says}.",
+            short(ambient[0].at(finest)),
+            short(finest),
+            short(picture[0].at(finest)),
+            short(ratio),
+            short(ambient[2].at(finest)),
+            short(ambient[1].at(finest)),
+            short(ambient[2].at(1.0)),
+        ),
+        ours: Ours::holding(holds && ambient[2].at(finest) < ambient[0].at(finest)),
+        control_fails: ratio > 1.0 && settling.progressive_frames > 0,
+        setting: format!(
+            "engine {}³ cut by a plane along the voxels, 14 rays, radius {RADIUS} voxels, {}² pixels; largest jump between any two \
+             frames that far apart, mean over the cut face's points or pixels; progressive: one slice in {PARTS} a frame",
+            plan.edge, plan.pixels
+        ),
+        charts: vec![
+            Chart {
+                title: "Jump of the ambient factor on the cut face from frame to frame".into(),
+                x: Quantity::log("step of the clip, voxels a frame"),
+                y: Quantity::log("largest jump, mean |Δ| over the face (0 … 1)"),
+                series: ambient,
+            },
+            Chart {
+                title: "Jump of the picture of the cut face from frame to frame".into(),
+                x: Quantity::log("step of the clip, voxels a frame"),
+                y: Quantity::log("largest jump, mean |Δ| of linear light (0 … 1)"),
+                series: picture,
+            },
+            Chart {
+                title: format!("Error of the shown ambient volume; the clip stops after frame {}", MOVES - 1),
+                x: Quantity::linear("frame"),
+                y: Quantity::linear("largest |error| of a visible voxel (0 … 1)"),
+                series: settling.series,
+            },
+        ],
+    })
+}
+
+/// What one frame shows of the cut face.
+struct Frame {
+    /// Ambient factor at points of the face, which move with it.
+    ambient: Vec<f64>,
+    /// Green light of the pixels that look at the face.
+    light: Vec<f64>,
+}
+
+/// For each step of 2ⁿ frames the largest change over it, in voxels a step.
+fn jumps(frames: &[Frame], per_voxel: usize, of: fn(&Frame) -> &Vec<f64>) -> Vec<[f64; 2]> {
+    let mut points = Vec::new();
+    let mut step = 1;
+    while step <= per_voxel {
+        let change = |i: usize| {
+            let pairs = of(&frames[i]).iter().zip(of(&frames[i + step]));
+            mean(&pairs.map(|(a, b)| (a - b).abs()).collect::<Vec<_>>())
+        };
+        let most = (0..frames.len() - step).map(change).fold(0.0, f64::max);
+        points.push([step as f64 / per_voxel as f64, most]);
+        step *= 2;
+    }
+    points
+}
+
+/// Moves the face `way` voxels from its start and looks at it.
+fn shown(cut: &mut PlaneCut, way: f64, pixels: u32) -> Result<Frame> {
+    let x = cut.place(way)?;
+    let ambient = cut.renderer.read_ambient()?;
+    let at_face = |&[y, z]: &[f64; 2]| trilinear_clamped(&cut.grid, &ambient, [x, y, z]);
+    let views = cut.views()?;
+    let look = Look { jitter: false, ..Look::default() };
+    let (picture, _) = cut.renderer.draw(&views, &look, [pixels; 2])?;
+    let light = |&[y, z]: &[f64; 2]| {
+        let world = cut.grid.to_world([x, y, z]).map(|c| c as f32);
+        let (uv, _) = views[0].project(Vec3::from_array(world))?;
+        let [u, v] = uv.to_array().map(|c| ((c * pixels as f32) as usize).min(pixels as usize - 1));
+        Some(f64::from(picture.colour[0][v * pixels as usize + u][1]))
+    };
+    Ok(Frame {
+        ambient: cut.face.iter().map(at_face).collect(),
+        light: cut.face.iter().filter_map(light).collect(),
+    })
+}
+
+/// What happens when the clip stops.
+struct Settling {
+    series: Vec<Series>,
+    /// Frames after the last move until nothing is off.
+    ours_frames: usize,
+    progressive_frames: usize,
+    /// Voxels of ours that differ from a full recomputation, all frames together.
+    different: u64,
+}
+
+fn settle(stage: &mut PlaneCut, tick: &mut dyn FnMut()) -> Result<Settling> {
+    let (mut ours, mut progressive) = (Vec::new(), Vec::new());
+    stage.place(0.0)?;
+    let mut shown = stage.renderer.read_ambient()?;
+    let (mut different, mut settled) = (0, [0; 2]);
+    let plane = stage.grid.dims[0] * stage.grid.dims[1];
+    for frame in 0..MOVES + RESTS {
+        let before = stage.renderer.read_ambient()?;
+        stage.place(0.75 * (frame + 1).min(MOVES) as f64)?;
+        let (difference, _) = stage.renderer.verify(&mut |_| ())?;
+        different += difference.different;
+        ours.push([frame as f64, f64::from(difference.largest)]);
+        // Ours equals a full recomputation where nothing differs, so that it serves as the truth.
+        let truth = stage.renderer.read_ambient()?;
+        let mask = stage.renderer.read_mask()?;
+        for (i, value) in shown.iter_mut().enumerate() {
+            if i / plane % PARTS == frame % PARTS {
+                *value = truth[i];
+            }
+        }
+        let off =
+            |i: usize| if mask[i] > 0 && stage.full[i] > 0.0 { (shown[i] - truth[i]).abs() } else { 0.0 };
+        let worst = (0..truth.len()).map(off).fold(0.0, f32::max);
+        progressive.push([frame as f64, f64::from(worst)]);
+        // After the last move nothing of ours may change any more.
+        let late = frame >= MOVES && before != truth;
+        if frame + 1 >= MOVES {
+            let rest = frame + 2 - MOVES;
+            let unsettled = late || difference.different > 0;
+            settled[0] = if unsettled { rest } else { settled[0] };
+            settled[1] = if f64::from(worst) > SETTLED { rest } else { settled[1] };
+        }
+        tick();
+    }
+    Ok(Settling {
+        series: vec![
+            Series::control("progressive LAO", progressive),
+            Series::ours("contextual update (ours)", ours),
+        ],
+        ours_frames: settled[0],
+        progressive_frames: settled[1],
+        different,
+    })
+}

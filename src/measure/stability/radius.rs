@@ -1,0 +1,126 @@
+//! Radius (measure.md §4): how dark LAO makes layers that lie inside others, as its radius grows.
+//!
+//! Nested translucent shells, each to be seen through the ones around it: a large radius gives the outer ones their shape, and
+//! buries the inner ones, whose rays all end in a shell. Feature-driven ambient occlusion (fdAO) is the answer to this; it does not exist here
+//! yet, so the sweep shows where ours, being LAO, stops being of use.
+
+use super::{Chart, Effort, Finding, Ours, Quantity, Series};
+use crate::Result;
+use crate::cpu::lao::lao_at;
+use crate::cpu::{Grid, each};
+use crate::measure::plot::short;
+use crate::measure::random::Random;
+use crate::occlusion::{Occlusion, Quadrature, RaySet};
+use crate::volume::builtin::builtin_box;
+
+/// Sizes and values of the sweep.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Voxels along an edge of the volume.
+    pub edge: usize,
+    /// Voxels of each layer that are looked at.
+    pub voxels: usize,
+    /// Radii in voxels.
+    pub radii: Vec<f64>,
+}
+
+impl Plan {
+    /// The plan for this effort.
+    pub fn of(effort: Effort) -> Self {
+        match effort {
+            Effort::Full => Self {
+                edge: 128,
+                voxels: 400,
+                radii: vec![4.0, 6.0, 8.0, 11.0, 16.0, 23.0, 32.0, 45.0, 64.0],
+            },
+            Effort::Quick => Self { edge: 96, voxels: 60, radii: vec![4.0, 8.0, 16.0, 32.0, 64.0] },
+        }
+    }
+}
+
+/// The fruit's layers from outside in: name, and range of the distance from the centre (half-edge 1, z stretched).
+const LAYERS: [(&str, f64, f64); 4] =
+    [("rind", 0.87, 0.91), ("pith", 0.79, 0.85), ("flesh", 0.45, 0.7), ("core", 0.265, 0.295)];
+
+/// Opacity of the rind, and of everything inside it: enough to be seen, and to see through.
+const OPACITY: f32 = 0.12;
+
+/// Shown at twice its value (the ray cast's gain), an ambient factor below this is darker than a fifth of full light.
+pub const BURIED: f64 = 0.1;
+
+/// Runs the sweep, telling the share done.
+pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
+    let volume = builtin_box("fruit", [plan.edge; 3], [1.0; 3])?;
+    let grid = Grid { dims: volume.dims, spacing: volume.spacing };
+    let opacity: Vec<f32> =
+        (0..grid.len()).map(|i| if volume.value(i) > 20.0 { OPACITY } else { 0.0 }).collect();
+    let mut random = Random::new(1);
+    let half = plan.edge as f64 / 2.0;
+    let members: Vec<Vec<[usize; 3]>> = LAYERS
+        .iter()
+        .map(|&(_, low, high)| {
+            let mut found = Vec::new();
+            for _ in 0..100_000 {
+                let voxel = grid.voxel(random.below(grid.len() as u64) as usize);
+                let [x, y, z] = voxel.map(|c| (c as f64 + 0.5 - half) / half);
+                let r = (x * x + y * y + (z / 0.92) * (z / 0.92)).sqrt();
+                if found.len() < plan.voxels && (low..high).contains(&r) && opacity[grid.index(voxel)] > 0.0 {
+                    found.push(voxel);
+                }
+            }
+            found
+        })
+        .collect();
+    let mut curves = vec![Vec::new(); LAYERS.len()];
+    for (n, &radius) in plan.radii.iter().enumerate() {
+        let occlusion = Occlusion {
+            rays: RaySet::R26,
+            quadrature: Quadrature::Segment,
+            radius_mm: radius as f32,
+            offset_mm: None,
+            step_mm: None,
+        };
+        for (curve, voxels) in curves.iter_mut().zip(&members) {
+            let values = each(voxels.len(), |i| lao_at(&grid, &opacity, &occlusion, 1.0, voxels[i]));
+            curve.push([radius, super::mean(&values)]);
+        }
+        progress((n + 1) as f64 / plan.radii.len() as f64);
+    }
+    let series: Vec<Series> = LAYERS
+        .iter()
+        .zip(curves)
+        .map(|(&(name, ..), points)| Series::ours(format!("{name}, LAO (ours)"), points))
+        .collect();
+    let (outer, inner) = (&series[0], &series[LAYERS.len() - 1]);
+    let ends = [inner.points[0], *inner.points.last().unwrap_or(&[0.0; 2])];
+    let buried = inner.points.iter().find(|point| point[1] < BURIED);
+    let from = match buried {
+        Some([radius, _]) => {
+            format!("below {BURIED}, too dark to tell from black, from {} voxels on", short(*radius))
+        }
+        None => format!("above {BURIED} throughout"),
+    };
+    Ok(Finding {
+        sentence: format!(
+            "LAO, ours included, darkens the core inside its shells from {} at {} voxels to {} at {} ({from}), while the rind \
+             keeps {}; feature-driven occlusion, which is to keep inner layers light, does not exist here yet.",
+            short(ends[0][1]),
+            short(ends[0][0]),
+            short(ends[1][1]),
+            short(ends[1][0]),
+            short(outer.at(ends[1][0]))
+        ),
+        ours: if buried.is_some() { Ours::Limited } else { Ours::Holds },
+        control_fails: ends[1][1] < outer.at(ends[1][0]),
+        setting: format!(
+            "fruit {}³, every layer of opacity {OPACITY} a voxel, 26 rays, segment rule, {} voxels of each layer",
+            plan.edge, plan.voxels
+        ),
+        charts: vec![Chart {
+            title: "Ambient factor of nested layers".into(),
+            x: Quantity::log("radius, voxels"),
+            y: Quantity::log("mean ambient factor of the layer (0 … 1)"),
+            series,
+        }],
+    })
+}
