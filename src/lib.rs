@@ -24,7 +24,7 @@
 //! | [`stage`] | the host side of each kernel of `spirv/`: parameters, bindings, `record` |
 //! | [`method`] | one method of ambient occlusion on one page each: dispatch, barrier, dispatch |
 //! | [`renderer`] | the frame: what changed, which stages run for it, both eyes |
-//! | [`measure`] | is it exact, do both eyes see the same, how far is it from the truth |
+//! | [`measure`] | is it exact, do both eyes see the same, how far is it from the truth, where do methods fail |
 //!
 //! # Conventions, once and for all
 //!
