@@ -24,7 +24,7 @@
 //! | [`stage`] | the host side of each kernel of `spirv/`: parameters, bindings, `record` |
 //! | [`method`] | one method of ambient occlusion on one page each: dispatch, barrier, dispatch |
 //! | [`renderer`] | the frame: what changed, which stages run for it, both eyes |
-//! | [`measure`] | is it exact, do both eyes see the same; how far is each method from the truth, and how fast |
+//! | [`measure`] | is it exact, do both eyes see the same; how far is each method from the truth, how fast, and where does it fail |
 //!
 //! # Conventions, once and for all
 //!

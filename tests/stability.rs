@@ -116,7 +116,11 @@ fn inner_layers_grow_dark_with_the_radius() {
     let [rind, core] = ["rind", "core"].map(|name| curve(&finding, 0, name));
     assert!(core.points.windows(2).all(|w| w[1][1] < w[0][1]), "{core:?}");
     assert!(core.at(48.0) < 0.5 * core.at(4.0) && core.at(48.0) < rind.at(48.0), "{}", finding.sentence);
+    assert_eq!(finding.ours, Ours::Limited, "{}", finding.sentence);
     assert!(finding.control_fails && finding.sentence.contains("ours included"), "{}", finding.sentence);
+    // Where the radius is small, inner layers are as light as the rind: the sweep can tell.
+    let near = radius::run(&radius::Plan { radii: vec![4.0, 6.0], ..plan }, &mut |_| ()).unwrap();
+    assert_eq!(near.ours, Ours::Holds, "{}", near.sentence);
 }
 
 #[test]

@@ -61,7 +61,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let voxels = Series::control("rays and steps in voxels, 26 rays, eq. (2)", voxels);
     let paper = Series::ours("rays and steps in mm (ours), 26 rays, eq. (2)", paper);
     let weighted = Series::ours("rays and steps in mm (ours), 50w rays, segment rule", weighted);
-    let truth = Series::control("ambient integral of the same fields: the voxels' own blur", truth);
+    let truth = Series::yardstick("ambient integral of the same fields: the voxels' own blur", truth);
     let last = plan.ratios[plan.ratios.len() - 1];
     let excess = |series: &Series| {
         let pairs = series.points.iter().zip(&truth.points);

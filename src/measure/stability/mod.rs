@@ -21,6 +21,7 @@ pub mod views;
 use crate::Result;
 use crate::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
 use crate::gpu::Gpu;
+use crate::measure::plot::short;
 use crate::stage::peel::Layers;
 
 /// How long a sweep may take.
@@ -39,6 +40,8 @@ pub enum Role {
     Ours,
     /// A method that fails.
     Control,
+    /// The truth, or what no method could do better.
+    Yardstick,
 }
 
 /// One curve.
@@ -63,9 +66,17 @@ impl Series {
         Self { name: name.into(), role: Role::Control, points }
     }
 
-    /// Largest measured value; 0 of nothing.
+    /// What the others are measured by.
+    pub fn yardstick(name: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), role: Role::Yardstick, points }
+    }
+
+    /// Largest measured value, NaN if any is; 0 of nothing.
     pub fn largest(&self) -> f64 {
-        self.points.iter().fold(0.0, |most, point| point[1].max(most))
+        // `f64::max` would drop a NaN, and with it what is wrong.
+        self.points
+            .iter()
+            .fold(0.0, |most, &[_, value]| if value.is_nan() || value > most { value } else { most })
     }
 
     /// Measured value where the parameter is nearest to `x`; NaN of nothing.
@@ -259,9 +270,26 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     sorted.get(place).copied().unwrap_or(0.0)
 }
 
+/// A number that may be far below a display's steps: then its power of ten tells more than its zeros.
+fn tiny(value: f64) -> String {
+    if value > 0.0 && value < 1e-4 { format!("{value:.0e}") } else { short(value) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_curve_with_a_nan_has_no_largest_value() {
+        let largest = |points: &[f64]| Series::ours("", points.iter().map(|y| [0.0, *y]).collect()).largest();
+        assert_eq!((largest(&[]), largest(&[1.0, 3.0, 2.0])), (0.0, 3.0));
+        assert!(largest(&[f64::NAN, 1.0]).is_nan() && largest(&[1.0, f64::NAN]).is_nan());
+    }
+
+    #[test]
+    fn tiny_numbers_are_powers_of_ten() {
+        assert_eq!([0.0, 3.1e-8, 0.25].map(tiny), ["0", "3e-8", "0.25"]);
+    }
 
     #[test]
     fn quantiles_and_means_are_of_the_values() {

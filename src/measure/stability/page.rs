@@ -12,15 +12,20 @@ const ROOM: [f64; 4] = [84.0, 34.0, 24.0, 54.0];
 /// Height of a line of the legend and of the caption.
 const LINE: f64 = 18.0;
 
-/// Blues and greens are ours, reds and oranges what fails (Okabe and Ito's palette, and shades of it): told apart by readers
-/// who see fewer colours, too, for their markers differ.
+/// Blues and greens are ours, reds and oranges what fails (Okabe and Ito's palette, and shades of it), greys yardsticks: told apart
+/// by readers who see fewer colours, too, for their markers differ.
 const OURS: [&str; 4] = ["#0072b2", "#009e73", "#56b4e9", "#004b76"];
-const CONTROL: [&str; 6] = ["#d55e00", "#e69f00", "#cc79a7", "#8c3d00", "#7a7a7a", "#b5a400"];
+const CONTROL: [&str; 6] = ["#d55e00", "#e69f00", "#cc79a7", "#8c3d00", "#b00020", "#b5a400"];
+const YARDSTICK: [&str; 2] = ["#555555", "#999999"];
 const MARKERS: [Marker; 4] = [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond];
 
 /// Colour and marker of the series that is the `nth` of its role.
 fn style(role: Role, nth: usize) -> (&'static str, Marker) {
-    let colours: &[_] = if role == Role::Ours { &OURS } else { &CONTROL };
+    let colours: &[_] = match role {
+        Role::Ours => &OURS,
+        Role::Control => &CONTROL,
+        Role::Yardstick => &YARDSTICK,
+    };
     (colours[nth % colours.len()], MARKERS[nth % MARKERS.len()])
 }
 
@@ -41,24 +46,24 @@ pub fn draw(chart: &Chart, setting: &str) -> Drawing {
         y: axis(&chart.y, 1),
     };
     panel.draw(&mut drawing, &chart.title);
-    let (mut ours, mut control) = (0, 0);
+    let mut before: Vec<Role> = Vec::new();
     let mut y = HEIGHT + LINE * 0.7;
     for series in &chart.series {
-        let nth = if series.role == Role::Ours { &mut ours } else { &mut control };
-        let (colour, marker) = style(series.role, *nth);
-        *nth += 1;
-        // What fails is dashed and hollow, so that curves that lie on one another both show.
-        let fails = series.role == Role::Control;
-        let radius = if fails { 5.0 } else { 3.5 };
+        let nth = before.iter().filter(|role| **role == series.role).count();
+        let (colour, marker) = style(series.role, nth);
+        before.push(series.role);
+        // What is not ours is dashed and hollow, so that curves that lie on one another both show.
+        let hollow = series.role != Role::Ours;
+        let radius = if hollow { 5.0 } else { 3.5 };
         let places: Vec<[f64; 2]> =
             series.points.iter().filter(|p| p[1].is_finite()).map(|p| panel.place(p[0], p[1])).collect();
-        drawing.polyline(&places, colour, 2.0, fails);
+        drawing.polyline(&places, colour, 2.0, hollow);
         for at in places {
-            drawing.marker(marker, at, radius, colour, fails);
+            drawing.marker(marker, at, radius, colour, hollow);
         }
         let at = [ROOM[0] + 12.0, y - 4.0];
-        drawing.line([at[0] - 12.0, at[1]], [at[0] + 12.0, at[1]], colour, 2.0, fails);
-        drawing.marker(marker, at, radius, colour, fails);
+        drawing.line([at[0] - 12.0, at[1]], [at[0] + 12.0, at[1]], colour, 2.0, hollow);
+        drawing.marker(marker, at, radius, colour, hollow);
         drawing.text([at[0] + 20.0, y], &series.name, 12, Anchor::Start, INK, false);
         y += LINE;
     }

@@ -45,8 +45,8 @@ const LAYERS: [(&str, f64, f64); 4] =
 /// Opacity of the rind, and of everything inside it: enough to be seen, and to see through.
 const OPACITY: f32 = 0.12;
 
-/// Shown at twice its value (the ray cast's gain), an ambient factor below this is darker than a fifth of full light.
-pub const BURIED: f64 = 0.1;
+/// An inner layer whose ambient factor is below this share of the rind's has lost what sets it off: it reads as shadow.
+pub const BURIED: f64 = 0.5;
 
 /// Runs the sweep, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
@@ -91,27 +91,36 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
         .zip(curves)
         .map(|(&(name, ..), points)| Series::ours(format!("{name}, LAO (ours)"), points))
         .collect();
-    let (outer, inner) = (&series[0], &series[LAYERS.len() - 1]);
-    let ends = [inner.points[0], *inner.points.last().unwrap_or(&[0.0; 2])];
-    let buried = inner.points.iter().find(|point| point[1] < BURIED);
-    let from = match buried {
-        Some([radius, _]) => {
-            format!("below {BURIED}, too dark to tell from black, from {} voxels on", short(*radius))
-        }
-        None => format!("above {BURIED} throughout"),
+    let rind = &series[0];
+    // The darkest layer inside the rind, as a share of the rind, at each radius.
+    let darkest = |n: usize| {
+        let of = |layer: usize| (series[layer].points[n][1] / rind.points[n][1], layer);
+        (1..LAYERS.len()).map(of).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, 0))
     };
+    let shares: Vec<(f64, usize)> = (0..plan.radii.len()).map(darkest).collect();
+    let (first, last) = (shares[0], shares[shares.len() - 1]);
+    let buried = shares.iter().position(|(share, _)| *share < BURIED);
+    let radius = |n: usize| short(plan.radii[n]);
+    let from = match buried {
+        Some(n) => format!("less than {BURIED} from {} voxels on", radius(n)),
+        None => format!("never less than {BURIED}"),
+    };
+    let inner = &series[last.1];
     Ok(Finding {
         sentence: format!(
-            "LAO, ours included, darkens the core inside its shells from {} at {} voxels to {} at {} ({from}), while the rind \
-             keeps {}; feature-driven occlusion, which is to keep inner layers light, does not exist here yet.",
-            short(ends[0][1]),
-            short(ends[0][0]),
-            short(ends[1][1]),
-            short(ends[1][0]),
-            short(outer.at(ends[1][0]))
+            "LAO, ours included, darkens inner layers as its radius grows: the {} from {} at {} voxels to {} at {}, which is {} of the rind's \
+             and {from} (at {} voxels the darkest has {}); feature-driven occlusion, which is to keep them light, does not exist here yet.",
+            LAYERS[last.1].0,
+            short(inner.points[0][1]),
+            radius(0),
+            short(inner.points[shares.len() - 1][1]),
+            radius(shares.len() - 1),
+            short(last.0),
+            radius(0),
+            short(first.0),
         ),
         ours: if buried.is_some() { Ours::Limited } else { Ours::Holds },
-        control_fails: ends[1][1] < outer.at(ends[1][0]),
+        control_fails: last.0 < first.0,
         setting: format!(
             "fruit {}³, every layer of opacity {OPACITY} a voxel, 26 rays, segment rule, {} voxels of each layer",
             plan.edge, plan.voxels

@@ -1,12 +1,11 @@
 //! Odd eyes (CAO §3.5 step 6, measure.md §4): inside the volume, with the near plane inside, equal, with asymmetric fields of view. No
 //! holes, no NaN, and both eyes read the same.
 //!
-//! An opaque block, so that every ray that meets it has to stop. Control of the holes: rays that begin on the block's front faces, as
+//! An opaque block, so that every ray that meets it has to stop; what both eyes read is compared in an engine of the same size. Control of the holes: rays that begin on the block's front faces, as
 //! those do that are started by rasterizing them: where the near plane or the eye is past the face, there is none. Control of the
 //! asymmetric eyes: a projection that takes them for symmetric, of the same width.
 
-use super::{Chart, Effort, Finding, Ours, Quantity, Series};
-use crate::Result;
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, tiny};
 use crate::gpu::Gpu;
 use crate::measure::exactness::{Stereo, compare_views};
 use crate::measure::plot::short;
@@ -16,7 +15,9 @@ use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
 use crate::stage::eyes::Look;
 use crate::transfer::TransferFunction;
 use crate::view::{StereoRig, Tangents, View};
+use crate::volume::Volume;
 use crate::volume::builtin::builtin_box;
+use crate::{Error, Result};
 use glam::{Vec2, Vec3};
 
 /// Sizes and values of the sweep.
@@ -80,7 +81,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         // The same eye twice sees the same picture, bit for bit.
         let same = stage.draw(&stage.views(StereoRig { ipd_mm: 0.0, ..rig })?)?;
         unequal += usize::from(same.colour[0] != same.colour[1] || same.depth[0] != same.depth[1]);
-        add(&mut eyes, compare_views(&stage.renderer, &views, &mut random)?);
+        add(&mut eyes, compare_views(&stage.engine, &views, &mut random)?);
         progress((n + 1) as f64 / total);
     }
     let (mut shifted, mut mistaken) = (Vec::new(), Vec::new());
@@ -115,13 +116,13 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             plan.distances.len(),
             eyes.different,
             eyes.points,
-            short(shifted.largest()),
+            tiny(shifted.largest()),
         ),
         ours: Ours::holding(holds),
         control_fails: front.largest() > 0.0 && mistaken.largest() > 10.0 * SAME_RAYS,
         setting: format!(
-            "opaque block {0}³, {1}² pixels an eye, near plane {NEAR} half-edges before the eye, eyes a tenth of a half-edge apart; consistency at \
-             points of the 1/256-voxel grid near surfaces",
+            "opaque block {0}³, {1}² pixels an eye, near plane {NEAR} half-edges before the eye, eyes a tenth of a half-edge apart; what both eyes read at points of the \
+             1/256-voxel grid near surfaces of an engine of the same size",
             plan.edge, plan.pixels
         ),
         charts: vec![
@@ -154,7 +155,10 @@ fn numberless(picture: &StereoImage) -> usize {
 }
 
 struct Stage {
+    /// The opaque block.
     renderer: Renderer,
+    /// An engine of the same size, whose surfaces eyes see from anywhere in it.
+    engine: Renderer,
     half: f32,
     pixels: u32,
 }
@@ -169,11 +173,20 @@ impl Stage {
             offset_mm: None,
             step_mm: None,
         };
-        let transfer = TransferFunction::new(vec![[0.0, 1.0]], vec![[0.0, 0.8, 0.7, 0.6]], None)?;
         let setup = Setup { occlusion, ..Setup::paper(1.0) };
-        let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;
-        renderer.update(&mut |_| ())?;
-        Ok(Self { renderer, half: 0.5 * plan.edge as f32, pixels: plan.pixels })
+        let ready = |volume: &Volume, transfer| {
+            let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR)?;
+            renderer.update(&mut |_| ())?;
+            Ok::<_, Error>(renderer)
+        };
+        let opaque = TransferFunction::new(vec![[0.0, 1.0]], vec![[0.0, 0.8, 0.7, 0.6]], None)?;
+        let engine = builtin_box("engine", [plan.edge; 3], [1.0; 3])?;
+        Ok(Self {
+            renderer: ready(&volume, opaque)?,
+            engine: ready(&engine, TransferFunction::preset("auto", engine.range())?)?,
+            half: 0.5 * plan.edge as f32,
+            pixels: plan.pixels,
+        })
     }
 
     fn rig(&self, distance: f32) -> StereoRig {
@@ -240,7 +253,7 @@ impl Stage {
         let (picture, _) = self.renderer.draw(&views, &look, [self.pixels; 2])?;
         let symmetric = View { tan: tan(-half_width, half_width), ..straight };
         let (plain, _) = self.renderer.draw(&[symmetric; 2], &look, [self.pixels; 2])?;
-        add(eyes, compare_views(&self.renderer, &views, random)?);
+        add(eyes, compare_views(&self.engine, &views, random)?);
 
         let offset = |eye: usize| {
             let side = if eye == 0 { -1.0 } else { 1.0 };
