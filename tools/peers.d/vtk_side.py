@@ -30,7 +30,7 @@ from vtkmodules.vtkRenderingCore import (
 from vtkmodules.vtkRenderingOpenGL2 import vtkRenderStepsPass, vtkSSAOPass, vtkTextureObject
 from vtkmodules.vtkRenderingVolume import vtkGPUVolumeRayCastMapper
 
-# VolumetricScatteringBlending, 0 … 2. At 1 light scatters where gradients are weak, and where they are strong surfaces are shaded.
+# VolumetricScatteringBlending, 0 … 2. At 1 light scatters where gradients are weak; steep ones are shaded as surfaces.
 BLENDING = 1.0
 # SSAO as 3D Slicer sets it, but for the radius: bias in units of the volume's diagonal, samples, blur.
 SSAO_BIAS = 0.001
@@ -189,6 +189,7 @@ class VolumeView:
         # Otherwise VTK takes fewer samples when it is late.
         self.mapper.SetAutoAdjustSampleDistances(0)
         self.mapper.SetSampleDistance(step)
+        # As ours against banding; it costs VTK single pixels that show the background.
         self.mapper.SetUseJittering(1)
         look = vtkVolumeProperty()
         as_it_is = vtkPiecewiseFunction()
