@@ -15,7 +15,7 @@ use cli_support::Folder;
 use common::{close, open};
 use std::collections::BTreeMap;
 
-const METHODS: [&str; 6] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO"];
+const METHODS: [&str; 7] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO", "sweep"];
 const RUNS: u32 = 2;
 
 fn scene(name: &str) -> Scene {

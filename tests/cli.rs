@@ -307,8 +307,17 @@ fn a_scene_is_drawn_for_both_eyes_side_by_side_and_one_by_one() {
     assert_eq!(answer["files"], json!(["stereo.png", "left.png", "right.png"]));
     assert_eq!((&answer["image_size"], &answer["dims"]), (&json!([40, 30]), &json!([24, 24, 24])));
     assert!(answer["device"].is_string());
-    for stage in ["opacity", "classify", "contextual", "raycast"] {
-        assert!(answer["stages_ms"][stage].as_f64().is_some_and(|ms| ms > 0.0), "{stage}: {answer}");
+    let has_stages = |answer: &Value, stages: &[&str]| {
+        for stage in stages {
+            assert!(answer["stages_ms"][stage].as_f64().is_some_and(|ms| ms > 0.0), "{stage}: {answer}");
+        }
+    };
+    has_stages(&answer, &["carve", "choose", "sweep", "raycast"]);
+    // A rule of the paper asks for the paper's method.
+    for flags in ["--method cao", "--quadrature left"] {
+        let answer = folder.json(&format!("render scene.toml {flags} -o cao.png"));
+        has_stages(&answer, &["opacity", "classify", "contextual", "raycast"]);
+        assert_eq!((&answer["method"], &answer["rays"]), (&json!("cao"), &json!("26")), "{flags}");
     }
 
     // Flags win over the scene; their clips join its clips.

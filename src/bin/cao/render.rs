@@ -6,7 +6,7 @@ use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
 use cao::picture::Picture;
 use cao::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use cao::scene::{Scene, Viewpoint};
+use cao::scene::{Method, Scene, Viewpoint};
 use cao::stage::classify::AntiAliasing;
 use cao::stage::clips::MapSettings;
 use cao::stage::eyes::Look;
