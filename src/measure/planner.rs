@@ -281,16 +281,17 @@ impl Calibration {
             Budget::Error(most) => refuse(
                 "error budget",
                 format!(
-                    "{most} is less than any of the {} settings tried reaches in this scene; the most accurate, {name}, errs by \
-                     up to {:.2e}: ask for that or more, or for other lengths",
+                    "{most} is less than any setting tried ({}) reaches in this scene; the most accurate, {name}, errs by up to \
+                     {:.2e}: ask for that or more, or for other lengths",
                     self.measured.len(),
-                    best.bound
+                    // Rounding to three digits takes no more than that away.
+                    1.005 * best.bound
                 ),
             ),
             Budget::Milliseconds(most) => refuse(
                 "time budget",
                 format!(
-                    "{most} ms is less than any of the {} settings tried takes for this scene; the quickest, {name}, takes about \
+                    "{most} ms is less than any setting tried ({}) takes for this scene; the quickest, {name}, takes about \
                      {:.3} ms: ask for {:.3} or more, or for a shorter radius",
                     self.measured.len(),
                     best.ms,
@@ -524,7 +525,7 @@ mod tests {
     fn what_cannot_be_had_is_refused_with_what_can() {
         let c = calibration(&[(0.05, 1.0), (0.02, 4.0)]);
         let said = c.choose(Budget::Error(0.019)).unwrap_err().to_string();
-        assert!(said.contains("0.019") && said.contains("2.00e-2") && said.contains("rays 26"), "{said}");
+        assert!(said.contains("0.019") && said.contains("2.01e-2") && said.contains("rays 26"), "{said}");
         let said = c.choose(Budget::Milliseconds(1.2)).unwrap_err().to_string();
         assert!(said.contains("1.2 ms") && said.contains("1.000 ms") && said.contains("1.250"), "{said}");
         assert!(calibration(&[]).choose(Budget::Error(1.0)).is_err());
