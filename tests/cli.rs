@@ -370,7 +370,9 @@ fn a_budget_chooses_among_what_the_flags_leave_open_and_says_what_it_measured() 
     ] {
         let answer = folder.json(&format!("{scene} {limits} {budget} -o chosen.nrrd"));
         let planned = &answer["planned"];
-        assert_eq!(planned["settings_tried"], tried, "{limits}: {answer}");
+        // More rays than keep the budget need not be tried.
+        let found = planned["settings_tried"].as_u64().unwrap();
+        assert!((1..=tried).contains(&found), "{limits}: {answer}");
         let number = |key: &str| planned[key].as_f64().unwrap();
         assert!(number("error") <= number("error_bound") && number("error_bound") < 0.5, "{answer}");
         assert!(

@@ -82,7 +82,7 @@ pub struct Measured {
 /// What a calibration found.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// Every candidate, in the order given.
+    /// The candidates that were tried.
     pub measured: Vec<Measured>,
     /// Sample bricks (x fastest), [`SAMPLES`] or all.
     pub bricks: Vec<u32>,
@@ -116,72 +116,123 @@ pub fn candidates(
     list
 }
 
-/// Tries every candidate on sample bricks of the scene as it is; sweeps are timed as a whole, since a brick swept alone costs more
-/// than among its neighbours. The renderer's ambient volume is out of date afterwards and its setup may be another.
-/// `progress` hears the share done (0 … 1). Uses the device's queue and waits for it.
+/// Tries candidates, the cheaper ones first where they stand first, on sample bricks of the scene as it is; sweeps are timed as a
+/// whole, since a brick swept alone costs more than among its neighbours. Where a budget is given, candidates that cannot be its
+/// choice, by the time that fewer rays took, are left out. The renderer's ambient volume is out of date afterwards and its setup may be
+/// another. `progress` hears the share done (0 … 1). Uses the device's queue and waits for it.
 ///
 /// # Errors
 /// Those of the device. Candidates that this volume or device cannot have are left out.
 pub fn calibrate(
     renderer: &mut Renderer,
     candidates: &[Candidate],
+    budget: Option<Budget>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Calibration> {
     let all = renderer.field().brick_count();
     let scope = renderer.setup().scope;
-    let needed = Scene::new(renderer)?.needed();
+    let scene = Scene::new(renderer)?;
+    let needed = scene.needed();
     let bricks = sample(&needed);
+    let samples = scene.samples(&bricks, candidates, &mut |part| progress(0.4 * part))?;
+    drop(scene);
     let (timed, computed) = match scope {
         Scope::Needed => (bricks.clone(), needed.len()),
         Scope::All => (sample(&(0..all).collect::<Vec<_>>()), all as usize),
     };
-    let measured = measure(renderer, candidates, &bricks, (&timed, computed), progress)?;
+    let mut rest = |part: f64| progress(0.4 + 0.6 * part);
+    let measured = try_all(renderer, candidates, &bricks, &samples, (&timed, computed), budget, &mut rest)?;
     Ok(Calibration { measured, bricks, needed })
 }
 
-/// The same with errors on bricks of one's own choice. `timed` are the bricks that cast rays are timed on, and the number of bricks
-/// that they stand for.
-pub fn measure(
+/// Errors of candidates on bricks of one's own choice; `ms` of cast rays is the time of one of these bricks.
+pub fn measure(renderer: &mut Renderer, candidates: &[Candidate], bricks: &[u32]) -> Result<Vec<Measured>> {
+    let samples = Scene::new(renderer)?.samples(bricks, candidates, &mut |_| ())?;
+    try_all(renderer, candidates, bricks, &samples, (bricks, 1), None, &mut |_| ())
+}
+
+/// A candidate is left out when it has to take this many times what the budget allows or another candidate that keeps it takes:
+/// times are no better known.
+const HOPELESS: f64 = 2.0;
+
+/// What is known of the candidates that were tried.
+struct Tried {
+    budget: Option<Budget>,
+    /// No choice takes longer, in ms.
+    limit: f64,
+    /// Least time in ms that a ray took, of cast rays and of sweeps.
+    ray_ms: [f64; 2],
+    measured: Vec<Measured>,
+}
+
+impl Tried {
+    fn rays(candidate: &Candidate) -> f64 {
+        candidate.occlusion.rays.directions().len() as f64
+    }
+
+    fn hopeless(&self, candidate: &Candidate) -> bool {
+        let ray_ms = self.ray_ms[usize::from(candidate.method == Method::Sweep)];
+        ray_ms.is_finite() && ray_ms * Self::rays(candidate) > HOPELESS * self.limit
+    }
+
+    fn add(&mut self, measured: Measured) {
+        let ray_ms = &mut self.ray_ms[usize::from(measured.candidate.method == Method::Sweep)];
+        *ray_ms = ray_ms.min(measured.ms / Self::rays(&measured.candidate));
+        if let Some(budget @ Budget::Error(_)) = self.budget
+            && budget.holds(&measured)
+        {
+            self.limit = self.limit.min(measured.ms);
+        }
+        self.measured.push(measured);
+    }
+}
+
+/// Sweeps first, which are the cheaper ones: they spare the most. `timed` are the bricks that cast rays are timed on, and the
+/// number of bricks that they stand for.
+fn try_all(
     renderer: &mut Renderer,
     candidates: &[Candidate],
     bricks: &[u32],
+    samples: &[Sample],
     timed: (&[u32], usize),
+    budget: Option<Budget>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<Measured>> {
-    let Some(like) = candidates.first() else { return Ok(Vec::new()) };
     let setup = *renderer.setup();
-    let mut measured: Vec<Option<Measured>> = vec![None; candidates.len()];
-    let scene = Scene::new(renderer)?;
-    let samples = scene.samples(bricks, &like.occlusion, &mut |part| progress(0.4 * part))?;
-    let mut done = 0;
-    let mut step = |progress: &mut dyn FnMut(f64)| {
-        done += 1;
-        progress(0.4 + 0.6 * f64::from(done) / candidates.len() as f64);
+    let limit = match budget {
+        Some(Budget::Milliseconds(most)) => most / TIME_MARGIN,
+        _ => f64::INFINITY,
     };
-    for (candidate, measured) in candidates.iter().zip(&mut measured) {
-        if candidate.method != Method::Sweep {
-            let (rmse, bound, brick_ms) = scene.cast(&candidate.occlusion, bricks, &samples, timed.0)?;
-            *measured = Some(Measured { candidate: *candidate, rmse, bound, ms: brick_ms * timed.1 as f64 });
-            step(progress);
-        }
-    }
-    drop(scene);
-    for (candidate, measured) in candidates.iter().zip(&mut measured) {
-        if candidate.method == Method::Sweep {
-            let Candidate { method, occlusion } = *candidate;
+    let mut tried = Tried { budget, limit, ray_ms: [f64::INFINITY; 2], measured: Vec::new() };
+    let (sweeps, casts): (Vec<Candidate>, Vec<Candidate>) =
+        candidates.iter().partition(|candidate| candidate.method == Method::Sweep);
+    let part = |done: usize| done as f64 / candidates.len() as f64;
+    for (i, &candidate) in sweeps.iter().enumerate() {
+        let Candidate { method, occlusion } = candidate;
+        if !tried.hopeless(&candidate) {
             match renderer.set_setup(Setup { method, occlusion, ..setup }) {
                 Ok(()) => {
                     let (values, ms) = swept(renderer)?;
-                    let (rmse, bound) = judge(&samples, |_, voxel| values[voxel]);
-                    *measured = Some(Measured { candidate: *candidate, rmse, bound, ms });
+                    let (rmse, bound) = judge(samples, |_, voxel| values[voxel]);
+                    tried.add(Measured { candidate, rmse, bound, ms });
                 }
                 Err(Error::Config { .. } | Error::Limit { .. }) => {}
                 Err(error) => return Err(error),
             }
-            step(progress);
+        }
+        progress(part(i + 1));
+    }
+    if !casts.is_empty() {
+        let scene = Scene::new(renderer)?;
+        for (i, &candidate) in casts.iter().enumerate() {
+            if !tried.hopeless(&candidate) {
+                let (rmse, bound, brick_ms) = scene.cast(&candidate.occlusion, bricks, samples, timed.0)?;
+                tried.add(Measured { candidate, rmse, bound, ms: brick_ms * timed.1 as f64 });
+            }
+            progress(part(sweeps.len() + i + 1));
         }
     }
-    Ok(measured.into_iter().flatten().collect())
+    Ok(tried.measured)
 }
 
 /// Ambient factors of everything by the renderer's sweep, and the median time in ms of the sweep.
@@ -230,16 +281,17 @@ impl Calibration {
             Budget::Error(most) => refuse(
                 "error budget",
                 format!(
-                    "{most} is less than any of the {} settings tried reaches in this scene; the most accurate, {name}, errs by \
-                     up to {:.2e}: ask for that or more, or for other lengths",
+                    "{most} is less than any setting tried ({}) reaches in this scene; the most accurate, {name}, errs by up to \
+                     {:.2e}: ask for that or more, or for other lengths",
                     self.measured.len(),
-                    best.bound
+                    // Rounding to three digits takes no more than that away.
+                    1.005 * best.bound
                 ),
             ),
             Budget::Milliseconds(most) => refuse(
                 "time budget",
                 format!(
-                    "{most} ms is less than any of the {} settings tried takes for this scene; the quickest, {name}, takes about \
+                    "{most} ms is less than any setting tried ({}) takes for this scene; the quickest, {name}, takes about \
                      {:.3} ms: ask for {:.3} or more, or for a shorter radius",
                     self.measured.len(),
                     best.ms,
@@ -333,13 +385,14 @@ impl<'a> Scene<'a> {
         (0..size.iter().product()).map(place).filter(|voxel| self.counts(*voxel)).collect()
     }
 
-    /// Some voxels of each brick that count, and their reference for settings with the lengths of `like`.
+    /// Some voxels of each brick that count, and their reference for candidates, which have the same lengths.
     fn samples(
         &self,
         bricks: &[u32],
-        like: &Occlusion,
+        candidates: &[Candidate],
         progress: &mut dyn FnMut(f64),
     ) -> Result<Vec<Sample>> {
+        let Some(Candidate { occlusion: like, .. }) = candidates.first() else { return Ok(Vec::new()) };
         let counting: Vec<Vec<usize>> = bricks.iter().map(|brick| self.counting(*brick)).collect();
         let mut random = Random::new(2);
         let mut some = |all: &Vec<usize>| -> Vec<usize> {
@@ -472,7 +525,7 @@ mod tests {
     fn what_cannot_be_had_is_refused_with_what_can() {
         let c = calibration(&[(0.05, 1.0), (0.02, 4.0)]);
         let said = c.choose(Budget::Error(0.019)).unwrap_err().to_string();
-        assert!(said.contains("0.019") && said.contains("2.00e-2") && said.contains("rays 26"), "{said}");
+        assert!(said.contains("0.019") && said.contains("2.01e-2") && said.contains("rays 26"), "{said}");
         let said = c.choose(Budget::Milliseconds(1.2)).unwrap_err().to_string();
         assert!(said.contains("1.2 ms") && said.contains("1.000 ms") && said.contains("1.250"), "{said}");
         assert!(calibration(&[]).choose(Budget::Error(1.0)).is_err());
@@ -488,6 +541,32 @@ mod tests {
         // A brick with three times the voxels counts three times.
         assert_eq!(spread(&[(1.0, 4.0), (3.0, 0.0)]).0, 1.0);
         assert!(spread(&[(1.0, f64::NAN), (1.0, 1.0)]).1.is_nan());
+    }
+
+    #[test]
+    fn only_candidates_that_cannot_be_chosen_are_left_out() {
+        let of = |method, rays| Candidate { method, occlusion: Occlusion { rays, ..Occlusion::paper(1.0) } };
+        let new = |budget, limit| Tried {
+            budget: Some(budget),
+            limit,
+            ray_ms: [f64::INFINITY; 2],
+            measured: Vec::new(),
+        };
+        let sets = RaySet::ALL;
+        let hopeless = |tried: &Tried, method| sets.map(|rays| tried.hopeless(&of(method, rays)));
+        // 1 ms a ray: 6 ms keep the budget, so that what takes more than 12 ms is out, of this method only.
+        let mut tried = new(Budget::Error(0.1), f64::INFINITY);
+        let six = of(Method::Sweep, RaySet::R6);
+        tried.add(Measured { candidate: six, rmse: 0.2, bound: 0.2, ms: 6.0 });
+        assert_eq!(hopeless(&tried, Method::Sweep), [false; 7], "nothing keeps the budget yet");
+        tried.add(Measured { candidate: six, rmse: 0.05, bound: 0.1, ms: 6.0 });
+        assert_eq!(hopeless(&tried, Method::Sweep), sets.map(|rays| rays != RaySet::R6));
+        assert_eq!(hopeless(&tried, Method::Cao), [false; 7]);
+        // 10 ms allow 20.
+        let mut tried = new(Budget::Milliseconds(12.5), 10.0);
+        tried.add(Measured { candidate: of(Method::Lao, RaySet::R6), rmse: 0.2, bound: 0.2, ms: 6.0 });
+        let far = |rays: RaySet| rays.directions().len() > 20;
+        assert_eq!(hopeless(&tried, Method::Lao), sets.map(far));
     }
 
     #[test]

@@ -37,7 +37,8 @@ pub fn plan(
     let start = Instant::now();
     let setup = *renderer.setup();
     let candidates = planner::candidates(&setup, method, settings.rays, settings.quadrature);
-    let calibration = planner::calibrate(renderer, &candidates, &mut |done| progress.set(done))?;
+    let calibration =
+        planner::calibrate(renderer, &candidates, Some(budget), &mut |done| progress.set(done))?;
     let chosen = calibration.choose(budget)?;
     let seconds = start.elapsed().as_secs_f64();
     let planner::Candidate { method, occlusion } = chosen.candidate;
