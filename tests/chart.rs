@@ -134,6 +134,7 @@ fn every_run_of_every_method_and_change_is_a_record_whose_parts_fit_together(cha
                         "{record:?}"
                     );
                     assert_eq!(stages > 0.0, method != "solid colour", "{record:?}");
+                    assert!(!record["total_ms"].starts_with('-'), "{record:?}");
                     let (rmse, max) = (number(record, "rmse"), number(record, "max"));
                     assert!(rmse > 0.0 && rmse <= max && max <= 1.0, "{record:?}");
                     assert!(number(record, "bias").abs() <= rmse && number(record, "rmse_shape") <= rmse);

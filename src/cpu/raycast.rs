@@ -65,7 +65,8 @@ pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
     Image { colour, depth }
 }
 
-/// Index coordinates at which these pixels read the ambient factor, in the order of their rays.
+/// Index coordinates at which these pixels read the ambient factor, in the order of their rays; where a ray ends depends on what it has
+/// read, and these go as far as the darkest does.
 pub fn ambient_positions(
     frame: &Frame,
     view: &View,
@@ -76,7 +77,7 @@ pub fn ambient_positions(
         let mut positions = Vec::new();
         pixel(frame, view, size, pixels[i], &mut |position| {
             positions.push(position);
-            1.0
+            0.0
         });
         positions
     })

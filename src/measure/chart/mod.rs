@@ -409,7 +409,8 @@ fn compete_in(
                 say(change.name(), work);
                 let stages = contender.update(change, states[run % 2])?;
                 work.done += Work::update(scene, entry);
-                let total_ms: f64 = stages.iter().map(|(_, ms)| ms).sum();
+                // The sum of nothing is -0.
+                let total_ms = 0.0 + stages.iter().map(|(_, ms)| ms).sum::<f64>();
                 if run == 0 {
                     points[n].push(truth.judge(scene, subject, entry, change, &contender.ambient()?));
                     continue;
