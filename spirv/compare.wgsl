@@ -1,11 +1,17 @@
 // Bit by bit comparison of two ambient volumes on every voxel that has a value: all but clipped voxels that touch no visible
 // one, and, where only needed voxels are computed, voxels without opacity in their 3x3x3. The list holds the bricks of the
-// full computation; no other brick has such voxels.
+// full computation; no other brick has such voxels. After a sweep, which has no mask, bricks tell what was recomputed.
 
 struct CompareParams {
     dims: vec3<u32>,
     only_needed: u32,
     bricks: vec3<u32>,
+    // 1: recomputed are the voxels of the bricks of `todo`; no voxel is clipped beyond its opacity of 0, and the mask is not read
+    by_brick: u32,
+}
+
+struct Todo {
+    brick: array<u32>,
 }
 
 struct Difference {
@@ -20,6 +26,7 @@ struct Difference {
 #include "shared/bricks.wgsl"
 
 const CLIPPED = 0u;
+const AFFECTED = 1u;
 const UNTOUCHED = 2u;
 
 var<immediate> params: CompareParams;
@@ -29,9 +36,20 @@ var<immediate> params: CompareParams;
 @group(0) @binding(3) var actual: texture_3d<f32>;
 @group(0) @binding(4) var<storage, read> list: BrickList;
 @group(0) @binding(5) var<storage, read_write> difference: Difference;
+@group(0) @binding(6) var<storage, read> todo: Todo;
+
+// As the mask has it.
+fn category_of(voxel: vec3<u32>) -> u32 {
+    if params.by_brick == 0u {
+        return textureLoad(mask, voxel, 0).r;
+    }
+    let brick = voxel / 8u;
+    let listed = todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+    return select(UNTOUCHED, AFFECTED, listed == 1u);
+}
 
 fn compare(voxel: vec3<u32>) {
-    let category = textureLoad(mask, voxel, 0).r;
+    let category = category_of(voxel);
     var touches_visible = category != CLIPPED;
     var touches_opacity = params.only_needed == 0u || textureLoad(opacity, voxel, 0).r > 0.0;
     let last = min(voxel + 1u, params.dims - 1u);
@@ -39,7 +57,7 @@ fn compare(voxel: vec3<u32>) {
     for (var z = first.z; z <= last.z && !(touches_visible && touches_opacity); z++) {
         for (var y = first.y; y <= last.y; y++) {
             for (var x = first.x; x <= last.x; x++) {
-                touches_visible = touches_visible || textureLoad(mask, vec3(x, y, z), 0).r != CLIPPED;
+                touches_visible = touches_visible || category_of(vec3(x, y, z)) != CLIPPED;
                 touches_opacity = touches_opacity || textureLoad(opacity, vec3(x, y, z), 0).r > 0.0;
             }
         }

@@ -29,6 +29,7 @@ struct Rays {
 }
 
 #include "shared/bricks.wgsl"
+#include "shared/segment.wgsl"
 
 const BY_MASK = 1u;
 const ONLY_NEEDED = 2u;
@@ -92,29 +93,6 @@ fn ray_cell(start: vec3<f32>, direction: vec3<f32>) -> f32 {
     return sum / f32(params.samples);
 }
 
-// method.md section 3: mean of -ln q for q linear from q0 to q1. The series takes over where the difference of the
-// closed form would cancel; at a tenth of the mean its next term is 3e-7.
-fn mean_extinction(q0: f32, q1: f32) -> f32 {
-    let mean = 0.5 * (q0 + q1);
-    let difference = q1 - q0;
-    if abs(difference) <= 0.1 * mean {
-        let relative = difference / mean;
-        return relative * relative / 24.0 - log(mean);
-    }
-    // q ln q -> 0 at q = 0
-    let e0 = select(q0 * log(q0), 0.0, q0 <= 0.0);
-    let e1 = select(q1 * log(q1), 0.0, q1 <= 0.0);
-    return 1.0 - (e1 - e0) / difference;
-}
-
-// (1 - exp(-x)) / x; below 0.01 its series, whose next term is 4e-8.
-fn mean_transmittance(x: f32) -> f32 {
-    if x < 0.01 {
-        return 1.0 - x * (0.5 - x / 6.0);
-    }
-    return (1.0 - exp(-x)) / x;
-}
-
 // method.md section 3, exact segment rule. The first segment begins half a step before the first sample, so that all
 // directions begin at the same distance.
 fn ray_segment(start: vec3<f32>, direction: vec3<f32>) -> f32 {
@@ -129,9 +107,12 @@ fn ray_segment(start: vec3<f32>, direction: vec3<f32>) -> f32 {
         if max(q0, q1) < 1e-6 {
             break;
         }
-        let depth = mean_extinction(max(q0, 0.0), max(q1, 0.0)) * length * params.exponent;
-        sum += length * before * mean_transmittance(depth);
-        before *= exp(-depth);
+        let near = max(q0, 0.0);
+        let far = max(q1, 0.0);
+        let depth = mean_extinction(near, logarithm(near), far, logarithm(far)) * length * params.exponent;
+        let through = exp(-depth);
+        sum += length * before * mean_transmittance(depth, through);
+        before *= through;
         if m < params.samples {
             q0 = q1;
             q1 = 1.0 - opacity_at(start + (params.first + f32(m) * params.step) * direction);

@@ -1,5 +1,5 @@
 // Stage 6 of CAO section 3.5: the volume by ray casting, all views in one multiview pass. Front to back, early
-// termination, bricks without opacity skipped, clipped samples skipped by the shadow test of section 3.2, ambient factor
+// termination, leaps over bricks that show nothing, clipped samples skipped by the shadow test of section 3.2, ambient factor
 // from V_AO at every sample that shows anything.
 
 #include "shared/transfer.wgsl"
@@ -11,7 +11,7 @@
 @group(0) @binding(4) var field: sampler;
 @group(0) @binding(5) var edge: sampler;
 @group(0) @binding(6) var<uniform> frame: Frame;
-@group(0) @binding(7) var<storage, read> occupancy: Occupancy;
+@group(0) @binding(7) var<storage, read> distances: Distances;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 
@@ -23,8 +23,9 @@ struct RaycastParams {
     size: vec2<f32>,
 }
 
-struct Occupancy {
-    visible: array<u32>,
+struct Distances {
+    // as brick_distance writes them
+    word: array<u32>,
 }
 
 struct Pixel {
@@ -43,6 +44,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
     let below = index == 1u || index == 4u || index == 5u;
     return vec4(select(-1.0, 1.0, right), select(-1.0, 1.0, below), 0.0, 1.0);
 }
+
+// Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
+const LEAP_MARGIN = 0.1;
 
 // Halvings of a step at a cut: to 1/16 of it.
 const CUT_HALVINGS = 4u;
@@ -70,6 +74,19 @@ fn surface_light(position: vec3<f32>) -> f32 {
     return abs(dot(gradient, frame.light.xyz)) / steepness;
 }
 
+// Whether nothing that lies further along the ray can change a pixel of the picture by more than the frame's tolerance. What
+// remains adds at most its share of the brightest light to a component, or takes as much of a background; sRGB coding
+// spreads that by its slope, which is largest at the darkest component so far (12.92 at 0, 1.055/2.4 c^(-7/12) above).
+fn ends(colour: vec3<f32>, alpha: f32) -> bool {
+    let rest = 1.0 - alpha;
+    // The slope at 1 is the least.
+    if rest * 0.4396 > frame.remainder {
+        return false;
+    }
+    let darkest = clamp(min(colour.r, min(colour.g, colour.b)), 0.003, 1.0);
+    return rest * min(12.92, 0.4396 * pow(darkest, -7.0 / 12.0)) <= frame.remainder;
+}
+
 @fragment
 fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32) -> Pixel {
     let uv = place.xy / params.size;
@@ -91,38 +108,52 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
     // Samples so far, and that number at the last hidden one: integers, for an f32 stops counting at 2^24.
     var k = 0u;
     var hidden = 0xffffffffu;
+    // The sample at which the last leap over something hidden ended.
+    var landed = 0xffffffffu;
     loop {
         let t = ray.begin + (f32(k) + phase) * ray.step;
-        if !(t < ray.end) || alpha >= frame.opaque {
+        if !(t < ray.end) {
             break;
         }
         let position = start + t * along;
         let brick = clamp(vec3<i32>(floor(position / 8.0)), vec3(0), last_brick);
-        let index = (u32(brick.z) * bricks.y + u32(brick.y)) * bricks.x + u32(brick.x);
-        if occupancy.visible[index] == 0u {
-            // To the first sample behind this brick; samples keep their places, so the picture does not change.
-            let low = vec3<f32>(brick) * 8.0;
-            let out_low = select((low - start) / along, vec3(1e30), brick == vec3(0));
-            let out_high = select((low + 8.0 - start) / along, vec3(1e30), brick == last_brick);
+        let word = distances.word[(u32(brick.z) * bricks.y + u32(brick.y)) * bricks.x + u32(brick.x)];
+        let to_opacity = i32(word & 0xfffu);
+        let leap = i32(word >> 12u & 0xfffu);
+        if leap > 0 && k != landed {
+            // To the first sample behind the bricks nearer than `leap`; samples keep their places, so the picture does not
+            // change.
+            let low = vec3<f32>(brick - leap + 1) * 8.0;
+            let high = vec3<f32>(brick + leap) * 8.0;
+            let out_low = select((low - start) / along, vec3(1e30), brick < vec3(leap));
+            let out_high = select((high - start) / along, vec3(1e30), brick + leap > last_brick);
             // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
             let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
             let t_out = min(out.x, min(out.y, out.z));
-            let first = ceil((t_out - ray.begin) / ray.step - phase);
+            let first = ceil((t_out - ray.begin) / ray.step - phase - LEAP_MARGIN);
             k = max(k + 1u, u32(clamp(first, 0.0, 1e9)));
+            if to_opacity < leap {
+                // What a clip hides is among what is leapt over: the last sample of it may be the one before a cut.
+                k -= 1u;
+                landed = k;
+            }
             continue;
         }
         k += 1u;
-        if opacity_of(value_at(position)) <= 0.0 {
+        var value = value_at(position);
+        var a = opacity_of(value);
+        if a <= 0.0 {
             continue;
         }
-        if !visible(eye.origin.xyz + t * ray.direction) {
+        if !visible_to(word >> 24u, eye.origin.xyz + t * ray.direction) {
             hidden = k;
             continue;
         }
-        // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
-        // one depth and shows no rings.
         var t_shown = t;
+        var shown = position;
         if hidden == k - 1u {
+            // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
+            // one depth and shows no rings.
             var t_hidden = t - ray.step;
             for (var i = 0u; i < CUT_HALVINGS; i++) {
                 let middle = 0.5 * (t_hidden + t_shown);
@@ -132,10 +163,10 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
                     t_hidden = middle;
                 }
             }
+            shown = start + t_shown * along;
+            value = value_at(shown);
+            a = opacity_of(value);
         }
-        let shown = start + t_shown * along;
-        let value = value_at(shown);
-        let a = opacity_of(value);
         let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
         let light = frame.ambient + frame.diffuse * surface_light(shown);
         let shade = light * mix(1.0, frame.gain * ambient_at(shown), frame.occluded);
@@ -143,6 +174,9 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;
+        }
+        if ends(colour, alpha) {
+            break;
         }
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));

@@ -17,14 +17,14 @@
 //! | module | what it is |
 //! |---|---|
 //! | [`error`] | what can go wrong, with the file, field, call or limit |
-//! | [`view`] [`transfer`] [`mesh`] [`occlusion`] [`clip`] [`scene`] | plain data: the eyes; opacity and colour; triangle meshes; how occlusion is computed; clip shapes and poses; the scene file |
+//! | [`view`] [`transfer`] [`mesh`] [`occlusion`] [`lattice`] [`clip`] [`scene`] | plain data: the eyes; opacity and colour; triangle meshes; how occlusion is computed; the directions of a sweep; clip shapes and poses; the scene file |
 //! | [`volume`] [`picture`] | files in: NRRD, NIfTI, MetaImage, raw, built-in volumes; files out: NRRD, PNG |
 //! | [`cpu`] | the truth: each numerical stage once more, the paper's equation in plain loops. For tests, not a fallback |
 //! | [`gpu`] | Vulkan and nothing else: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
 //! | [`stage`] | the host side of each kernel of `spirv/`: parameters, bindings, `record` |
 //! | [`method`] | one method of ambient occlusion on one page each: dispatch, barrier, dispatch |
 //! | [`renderer`] | the frame: what changed, which stages run for it, both eyes |
-//! | [`measure`] | is it exact, do both eyes see the same, how far is it from the truth, where do methods fail |
+//! | [`measure`] | is it exact, do both eyes see the same; how far is each method from the truth, and how fast; where it fails |
 //!
 //! # Conventions, once and for all
 //!
@@ -82,6 +82,7 @@ pub mod clip;
 pub mod cpu;
 pub mod error;
 pub mod gpu;
+pub mod lattice;
 pub mod measure;
 pub mod mesh;
 pub mod method;

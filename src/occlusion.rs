@@ -181,6 +181,17 @@ impl Occlusion {
         Ok(())
     }
 
+    /// Distance in mm at which a lattice ray starts (method.md §4): by default half the smallest spacing, as other rays do.
+    pub fn lattice_offset(&self, min_spacing: f64) -> f32 {
+        self.offset_mm.unwrap_or((0.5 * min_spacing) as f32)
+    }
+
+    /// Largest distance in mm between samples of a lattice ray; by default every segment of a 26-set is one piece, √3
+    /// voxels long at most, and the longer ones of other sets have two (method.md §4).
+    pub fn lattice_step(&self, min_spacing: f64) -> f32 {
+        self.step_mm.unwrap_or((1.75 * min_spacing) as f32)
+    }
+
     /// Most samples of one ray; more has no use at any volume's size that a device holds.
     pub const MAX_SAMPLES: u32 = 4096;
 

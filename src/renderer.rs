@@ -11,17 +11,20 @@ use crate::clip::Clip;
 use crate::gpu::{
     Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder, Timings,
 };
-use crate::method::volumes::{Kernels, Settings, Volumes, volume_image};
+use crate::method::sweep::{self, Edit, SweepKernels, SweptVolumes};
+use crate::method::trial::Trial;
+use crate::method::volumes::{Kernels, Settings, Volumes, read_texels, read_values, volume_image};
 use crate::method::{cao, lao};
 use crate::occlusion::Occlusion;
 use crate::scene::Method;
+use crate::stage::brick_distance::BrickDistance;
 use crate::stage::classify::{AntiAliasing, Classify};
 use crate::stage::clips::{ClipSet, MapSettings};
-use crate::stage::compare::{Compare, Difference};
+use crate::stage::compare::{Compare, Difference, Recomputed};
 use crate::stage::consistency::{Consistency, Seen};
 use crate::stage::dilate::Dilate;
 use crate::stage::eyes::{FrameBuffer, Look, check_count};
-use crate::stage::field::Field;
+use crate::stage::field::{BRICK, Field};
 use crate::stage::lao::Scope;
 use crate::stage::occupancy::Occupancy;
 use crate::stage::opacity::Opacity;
@@ -98,16 +101,77 @@ struct Stale {
 
 impl Stale {
     const ALL: Self = Self { opacity: true, rays: true, precomputed: true, ambient: true };
+
+    /// Whether a sweep has something to do.
+    fn any(self) -> bool {
+        self.opacity || self.rays || self.ambient
+    }
+}
+
+/// Kernels and volumes of the method in use.
+enum Held {
+    /// [`Method::Lao`] and [`Method::Cao`], rays by the sampler.
+    Cast(Box<(Kernels, Volumes)>),
+    /// [`Method::Sweep`].
+    Swept(Box<(SweepKernels, SweptVolumes)>),
+}
+
+impl Held {
+    fn new(gpu: &Gpu, field: &Field, setup: &Setup) -> Result<Self> {
+        Ok(match setup.method {
+            Method::Lao | Method::Cao => {
+                Self::Cast(Box::new((Kernels::new(gpu)?, Volumes::new(gpu, field)?)))
+            }
+            Method::Sweep => {
+                let volumes = SweptVolumes::new(gpu, field, &setup.occlusion, setup.scope)?;
+                Self::Swept(Box::new((SweepKernels::new(gpu)?, volumes)))
+            }
+        })
+    }
+
+    /// V_o after clipping.
+    fn opacity(&self) -> &Image {
+        match self {
+            Self::Cast(cast) => &cast.1.opacity,
+            Self::Swept(swept) => &swept.1.opacity,
+        }
+    }
+
+    /// V_AO.
+    fn ambient(&self) -> &Image {
+        match self {
+            Self::Cast(cast) => &cast.1.ambient,
+            Self::Swept(swept) => &swept.1.ambient,
+        }
+    }
+
+    /// Bricks that can have opacity.
+    fn occupancy(&self) -> &Buffer {
+        match self {
+            Self::Cast(cast) => &cast.1.occupancy,
+            Self::Swept(swept) => &swept.1.occupancy,
+        }
+    }
+
+    /// What the clips do to each brick.
+    fn clip_bricks(&self) -> &Buffer {
+        match self {
+            Self::Cast(cast) => &cast.1.clip_bricks,
+            Self::Swept(swept) => &swept.1.clip_bricks,
+        }
+    }
 }
 
 /// Renders one volume.
 pub struct Renderer {
     gpu: Gpu,
     field: Field,
-    volumes: Volumes,
-    kernels: Kernels,
+    held: Held,
     opacity: Opacity,
     occupancy: Occupancy,
+    brick_distance: BrickDistance,
+    /// How far rays may leap.
+    distances: Buffer,
     peel: Peel,
     dilate: Dilate,
     raycast: Raycast,
@@ -137,10 +201,11 @@ impl Renderer {
         let field = Field::upload(gpu, volume)?;
         Ok(Self {
             gpu: gpu.clone(),
-            volumes: Volumes::new(gpu, &field)?,
-            kernels: Kernels::new(gpu)?,
+            held: Held::new(gpu, &field, &setup)?,
             opacity: Opacity::new(gpu)?,
             occupancy: Occupancy::new(gpu)?,
+            brick_distance: BrickDistance::new(gpu, &field)?,
+            distances: BrickDistance::buffer(gpu, &field)?,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,
             raycast: Raycast::new(gpu, colour)?,
@@ -164,18 +229,45 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it. On error
-    /// everything stays as it was.
+    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, and when rays are swept or
+    /// cast after the other. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
         setup.occlusion.check(f64::from(self.field.min_spacing()))?;
         let before = std::mem::replace(&mut self.setup, setup);
-        if let Err(error) = self.prepare_clips() {
+        if let Err(error) = self.prepare_clips().and_then(|()| self.hold()) {
             // Maps of one radius under rays of another would leave voxels stale.
             self.setup = before;
             self.prepare_clips()?;
             return Err(error);
         }
         self.stale = Stale { rays: true, precomputed: true, ambient: true, ..self.stale };
+        Ok(())
+    }
+
+    /// Makes what is held fit the setup.
+    fn hold(&mut self) -> Result<()> {
+        let Setup { occlusion, scope, method, .. } = self.setup;
+        match (&mut self.held, method) {
+            (Held::Cast(_), Method::Lao | Method::Cao) => {}
+            (Held::Swept(swept), Method::Sweep) => {
+                swept.1.set(&self.gpu, &self.field, &occlusion, scope)?;
+            }
+            _ => {
+                self.held = Held::new(&self.gpu, &self.field, &self.setup)?;
+                self.stale = Stale::ALL;
+            }
+        }
+        Ok(())
+    }
+
+    /// Overwrites a box of voxels, the first of which is `first`, by the values of a volume of the same type. Uses the device's
+    /// queue and waits for it.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the box is not inside the volume or the values are of another type.
+    pub fn set_values(&mut self, first: [u32; 3], values: &Volume) -> Result<()> {
+        self.field.overwrite(&self.gpu, first, values)?;
+        self.stale = Stale { opacity: true, precomputed: true, ambient: true, ..self.stale };
         Ok(())
     }
 
@@ -216,7 +308,10 @@ impl Renderer {
 
     /// The literal recipe dilates by the ray's length alone.
     fn map_radius(&self) -> f32 {
-        if self.setup.maps.literal {
+        if self.setup.method == Method::Sweep {
+            // Changes are found in the opacities; nothing is dilated.
+            0.0
+        } else if self.setup.maps.literal {
             self.setup.occlusion.reach(f64::from(self.field.min_spacing()))
         } else {
             Classify::reach(&self.field, &self.setup.occlusion)
@@ -237,33 +332,20 @@ impl Renderer {
     /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
     /// nothing counts as done, and what was recorded should not be submitted.
     pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
-        let settings = self.settings();
-        self.record_opacity(rec)?;
-        if self.setup.method == Method::Cao && self.stale.precomputed {
-            lao::record(
-                rec,
-                &self.field,
-                &self.kernels,
-                &self.volumes,
-                &settings,
-                &self.volumes.full_opacity,
-                &self.volumes.precomputed,
-            )?;
-            self.record_all_changed(rec)?;
-        }
-        if self.stale.ambient {
-            self.record_clips(rec)?;
-            match self.setup.method {
-                Method::Cao => cao::record(rec, &self.field, &self.kernels, &self.volumes, &settings)?,
-                Method::Lao => lao::record(
-                    rec,
-                    &self.field,
-                    &self.kernels,
-                    &self.volumes,
-                    &settings,
-                    &self.volumes.opacity,
-                    &self.volumes.ambient,
-                )?,
+        match &self.held {
+            Held::Cast(cast) => self.record_cast(rec, &cast.0, &cast.1)?,
+            Held::Swept(swept) => {
+                let (kernels, volumes) = &**swept;
+                if self.stale.opacity {
+                    self.record_transfer(rec)?;
+                    self.record_occupancy(rec)?;
+                }
+                if self.stale.any() {
+                    self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
+                    let (transfer, clips) = (&self.transfer_buffer, &self.clip_set);
+                    sweep::record(rec, &self.field, kernels, volumes, transfer, clips, &self.edit())?;
+                    self.record_distances(rec)?;
+                }
             }
         }
         self.updated();
@@ -273,36 +355,99 @@ impl Renderer {
     /// The same on the device's own queue, in parts, telling `progress` the share done of each long stage. Waits for
     /// the end; returns the time of each stage in ms, clip meshes prepared since the last update included.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
-        let settings = self.settings();
         let mut timings = std::mem::take(&mut self.prepared);
-        if self.stale.opacity || self.stale.rays {
-            let mut rec = self.gpu.recorder("opacity")?;
-            self.record_opacity(&mut rec)?;
-            timings.extend(rec.submit_and_wait()?);
-        }
-        let (field, kernels, volumes) = (&self.field, &self.kernels, &self.volumes);
-        if self.setup.method == Method::Cao && self.stale.precomputed {
-            let (from, to) = (&volumes.full_opacity, &volumes.precomputed);
-            let parts = lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?;
-            timings.extend(parts.into_iter().map(|(name, ms)| (format!("precompute {name}"), ms)));
-            let mut rec = self.gpu.recorder("changed")?;
-            self.record_all_changed(&mut rec)?;
-            rec.submit_and_wait()?;
-        }
-        if self.stale.ambient {
-            let mut rec = self.gpu.recorder("clips")?;
-            self.record_clips(&mut rec)?;
-            timings.extend(rec.submit_and_wait()?);
-            timings.extend(match self.setup.method {
-                Method::Cao => cao::run(&self.gpu, field, kernels, volumes, &settings, progress)?,
-                Method::Lao => {
-                    let (from, to) = (&volumes.opacity, &volumes.ambient);
-                    lao::run(&self.gpu, field, kernels, volumes, &settings, from, to, progress)?
+        match &self.held {
+            Held::Cast(cast) => timings.extend(self.update_cast(&cast.0, &cast.1, progress)?),
+            Held::Swept(swept) => {
+                let (kernels, volumes) = &**swept;
+                if self.stale.any() {
+                    let mut rec = self.gpu.recorder("opacity")?;
+                    if self.stale.opacity {
+                        self.record_transfer(&mut rec)?;
+                        self.record_occupancy(&mut rec)?;
+                    }
+                    self.clip_set.record(&mut rec, &self.clips, self.half_diagonal())?;
+                    timings.extend(rec.submit_and_wait()?);
+                    let (transfer, clips) = (&self.transfer_buffer, &self.clip_set);
+                    let (gpu, field, edit) = (&self.gpu, &self.field, self.edit());
+                    timings
+                        .extend(sweep::run(gpu, field, kernels, volumes, transfer, clips, &edit, progress)?);
+                    let mut rec = gpu.recorder("distances")?;
+                    self.record_distances(&mut rec)?;
+                    timings.extend(rec.submit_and_wait()?);
                 }
-            });
+            }
         }
         self.updated();
         Ok(timings)
+    }
+
+    fn record_cast(&self, rec: &mut Recorder, kernels: &Kernels, volumes: &Volumes) -> Result<()> {
+        let settings = self.settings();
+        self.record_opacity(rec, kernels, volumes)?;
+        if self.setup.method == Method::Cao && self.stale.precomputed {
+            let (from, to) = (&volumes.full_opacity, &volumes.precomputed);
+            lao::record(rec, &self.field, kernels, volumes, &settings, from, to)?;
+            Self::record_all_changed(rec, volumes)?;
+        }
+        if self.stale.ambient {
+            self.record_clips(rec, kernels, volumes)?;
+            self.record_distances(rec)?;
+            if self.setup.method == Method::Cao {
+                cao::record(rec, &self.field, kernels, volumes, &settings)?;
+            } else {
+                let (from, to) = (&volumes.opacity, &volumes.ambient);
+                lao::record(rec, &self.field, kernels, volumes, &settings, from, to)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn update_cast(
+        &self,
+        kernels: &Kernels,
+        volumes: &Volumes,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Timings> {
+        let settings = self.settings();
+        let (gpu, field) = (&self.gpu, &self.field);
+        let mut timings = Timings::new();
+        if self.stale.opacity || self.stale.rays {
+            let mut rec = gpu.recorder("opacity")?;
+            self.record_opacity(&mut rec, kernels, volumes)?;
+            timings.extend(rec.submit_and_wait()?);
+        }
+        if self.setup.method == Method::Cao && self.stale.precomputed {
+            let (from, to) = (&volumes.full_opacity, &volumes.precomputed);
+            let parts = lao::run(gpu, field, kernels, volumes, &settings, from, to, progress)?;
+            timings.extend(parts.into_iter().map(|(name, ms)| (format!("precompute {name}"), ms)));
+            let mut rec = gpu.recorder("changed")?;
+            Self::record_all_changed(&mut rec, volumes)?;
+            rec.submit_and_wait()?;
+        }
+        if self.stale.ambient {
+            let mut rec = gpu.recorder("clips")?;
+            self.record_clips(&mut rec, kernels, volumes)?;
+            self.record_distances(&mut rec)?;
+            timings.extend(rec.submit_and_wait()?);
+            timings.extend(if self.setup.method == Method::Cao {
+                cao::run(gpu, field, kernels, volumes, &settings, progress)?
+            } else {
+                let (from, to) = (&volumes.opacity, &volumes.ambient);
+                lao::run(gpu, field, kernels, volumes, &settings, from, to, progress)?
+            });
+        }
+        Ok(timings)
+    }
+
+    /// What changed, as a sweep wants it told.
+    fn edit(&self) -> Edit {
+        Edit {
+            opacities: self.stale.opacity,
+            ambient: self.stale.rays,
+            anti_aliasing: self.setup.anti_aliasing,
+            reference_mm: self.settings().reference_mm,
+        }
     }
 
     /// Takes nothing on the device for granted, so that the next update recomputes everything: after commands of
@@ -328,42 +473,69 @@ impl Renderer {
         // Hosts that only record never ask for these times; they must not pile up.
         self.prepared.clear();
         // V_PAO belongs to contextual updates only; a full one leaves it as stale as it was.
-        let precomputed = self.stale.precomputed && self.setup.method == Method::Lao;
+        let precomputed = self.stale.precomputed && self.setup.method != Method::Cao;
         self.stale = Stale { opacity: false, rays: false, precomputed, ambient: false };
     }
 
-    fn record_opacity(&self, rec: &mut Recorder) -> Result<()> {
+    fn record_transfer(&self, rec: &mut Recorder) -> Result<()> {
+        self.transfer_buffer.record(rec, &self.transfer)?;
+        rec.barrier(
+            &[Access::SampledRead, Access::StorageRead, Access::GraphicsRead, Access::TransferWrite],
+            &[Access::StorageWrite, Access::SampledRead],
+        );
+        Ok(())
+    }
+
+    fn record_occupancy(&self, rec: &mut Recorder) -> Result<()> {
+        rec.stage("occupancy")?;
+        self.occupancy.record(rec, &self.field, &self.transfer_buffer, self.held.occupancy())?;
+        rec.end_stage()?;
+        rec.barrier(
+            &[Access::StorageWrite],
+            &[Access::StorageRead, Access::SampledRead, Access::GraphicsRead],
+        );
+        Ok(())
+    }
+
+    fn record_opacity(&self, rec: &mut Recorder, kernels: &Kernels, volumes: &Volumes) -> Result<()> {
         if self.stale.rays {
-            self.kernels.lao.record_rays(rec, &self.setup.occlusion)?;
+            kernels.lao.record_rays(rec, &self.setup.occlusion)?;
         }
         if self.stale.opacity {
-            self.transfer_buffer.record(rec, &self.transfer)?;
-            rec.barrier(
-                &[Access::SampledRead, Access::GraphicsRead, Access::TransferWrite],
-                &[Access::StorageWrite, Access::SampledRead],
-            );
+            self.record_transfer(rec)?;
             rec.stage("opacity")?;
-            self.opacity.record(rec, &self.field, &self.transfer_buffer, &self.volumes.full_opacity)?;
+            self.opacity.record(rec, &self.field, &self.transfer_buffer, &volumes.full_opacity)?;
             rec.end_stage()?;
-            rec.stage("occupancy")?;
-            self.occupancy.record(rec, &self.field, &self.transfer_buffer, &self.volumes.occupancy)?;
-            rec.end_stage()?;
-            rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead]);
+            self.record_occupancy(rec)?;
         }
+        Ok(())
+    }
+
+    /// How far rays may leap, after new occupancy or clips.
+    fn record_distances(&self, rec: &mut Recorder) -> Result<()> {
+        let (occupancy, clip_bricks) = (self.held.occupancy(), self.held.clip_bricks());
+        rec.barrier(
+            &[Access::StorageRead, Access::StorageWrite, Access::GraphicsRead],
+            &[Access::StorageRead, Access::StorageWrite],
+        );
+        rec.stage("distances")?;
+        self.brick_distance.record(rec, &self.field, occupancy, clip_bricks, &self.distances)?;
+        rec.end_stage()?;
+        rec.barrier(&[Access::StorageWrite], &[Access::GraphicsRead]);
         Ok(())
     }
 
     /// After a new V_PAO every brick of V_AO is out of date.
-    fn record_all_changed(&self, rec: &mut Recorder) -> Result<()> {
+    fn record_all_changed(rec: &mut Recorder, volumes: &Volumes) -> Result<()> {
         rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
-        rec.fill(&self.volumes.changed_before, 0, self.volumes.changed_before.bytes(), 1)?;
+        rec.fill(&volumes.changed_before, 0, volumes.changed_before.bytes(), 1)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         Ok(())
     }
 
-    fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
+    fn record_clips(&self, rec: &mut Recorder, kernels: &Kernels, volumes: &Volumes) -> Result<()> {
         self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
-        let count = &self.kernels.classify.count;
+        let count = &kernels.classify.count;
         rec.barrier(&[Access::TransferRead, Access::StorageWrite], &[Access::TransferWrite]);
         rec.fill(count, 0, count.bytes(), 0)?;
         rec.barrier(
@@ -372,10 +544,10 @@ impl Renderer {
         );
         let reach = Classify::reach(&self.field, &self.setup.occlusion);
         rec.stage("classify")?;
-        let clip_bricks = &self.volumes.clip_bricks;
-        self.kernels.clip_bricks.record(rec, &self.field, &self.clip_set, reach, clip_bricks)?;
+        let clip_bricks = &volumes.clip_bricks;
+        kernels.clip_bricks.record(rec, &self.field, &self.clip_set, reach, clip_bricks)?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
-        self.kernels.classify.record(
+        kernels.classify.record(
             rec,
             &self.field,
             &self.clip_set,
@@ -383,9 +555,9 @@ impl Renderer {
             reach,
             self.setup.maps.literal,
             clip_bricks,
-            &self.volumes.full_opacity,
-            &self.volumes.opacity,
-            &self.volumes.mask,
+            &volumes.full_opacity,
+            &volumes.opacity,
+            &volumes.mask,
         )?;
         rec.end_stage()?;
         rec.barrier(
@@ -413,9 +585,9 @@ impl Renderer {
         let bindings = Bindings {
             field: &self.field,
             transfer: &self.transfer_buffer,
-            opacity: &self.volumes.opacity,
-            ambient: &self.volumes.ambient,
-            occupancy: &self.volumes.occupancy,
+            opacity: self.held.opacity(),
+            ambient: self.held.ambient(),
+            distances: &self.distances,
             clips: &self.clip_set,
             frame: &self.frame,
         };
@@ -491,25 +663,66 @@ impl Renderer {
     /// and waits for it.
     pub fn verify(&self, progress: &mut dyn FnMut(f64)) -> Result<(Difference, Timings)> {
         self.current()?;
-        let expected = volume_image(&self.gpu, "expected ambient", &self.field, Format::R32Float)?;
+        let format = self.held.ambient().desc().format;
+        let expected = volume_image(&self.gpu, "expected ambient", &self.field, format)?;
         let mut rec = self.gpu.recorder("expected")?;
         rec.discard(&expected);
+        rec.barrier(&[], &[Access::TransferWrite]);
+        rec.clear_image(&expected, [1.0; 4])?;
         rec.submit_and_wait()?;
-        let v = &self.volumes;
-        let settings = self.settings();
-        let timings =
-            lao::run(&self.gpu, &self.field, &self.kernels, v, &settings, &v.opacity, &expected, progress)?;
-        let difference = Compare::new(&self.gpu)?.run(
-            &self.gpu,
-            &self.field,
-            self.setup.scope,
-            &v.list,
-            &v.opacity,
-            &v.mask,
-            &expected,
-            &v.ambient,
-        )?;
+        let (gpu, field, scope, settings) = (&self.gpu, &self.field, self.setup.scope, self.settings());
+        let compare = Compare::new(gpu)?;
+        let (difference, timings) = match &self.held {
+            Held::Cast(cast) => {
+                let (kernels, v) = &**cast;
+                let timings = lao::run(gpu, field, kernels, v, &settings, &v.opacity, &expected, progress)?;
+                let by_mask = Recomputed::Mask(&v.mask);
+                let difference =
+                    compare.run(gpu, field, scope, &v.list, &v.opacity, by_mask, &expected, &v.ambient)?;
+                (difference, timings)
+            }
+            Held::Swept(swept) => {
+                let (kernels, v) = &**swept;
+                let (all, timings) =
+                    sweep::recompute(gpu, field, kernels, v, settings.reference_mm, &expected, progress)?;
+                let by_brick = Recomputed::Bricks(&v.todo);
+                let difference =
+                    compare.run(gpu, field, scope, &all, &v.opacity, by_brick, &expected, &v.ambient)?;
+                (difference, timings)
+            }
+        };
         Ok((difference, timings))
+    }
+
+    /// Brings V_o up to date and lends it to trials of other rays; also returns it, x fastest. V_AO goes out of date: the next
+    /// update computes everything. Uses the device's queue and waits for it.
+    pub fn trial(&mut self) -> Result<(Trial<'_>, Vec<f32>)> {
+        let mut rec = self.gpu.recorder("opacity")?;
+        match &self.held {
+            Held::Cast(cast) => {
+                self.record_opacity(&mut rec, &cast.0, &cast.1)?;
+                self.record_clips(&mut rec, &cast.0, &cast.1)?;
+            }
+            Held::Swept(swept) => {
+                let (kernels, volumes) = &**swept;
+                if self.stale.opacity {
+                    self.record_transfer(&mut rec)?;
+                    self.record_occupancy(&mut rec)?;
+                }
+                self.clip_set.record(&mut rec, &self.clips, self.half_diagonal())?;
+                let (transfer, clips) = (&self.transfer_buffer, &self.clip_set);
+                let edit = self.edit();
+                sweep::record_choice(&mut rec, &self.field, kernels, volumes, transfer, clips, &edit)?;
+                rec.barrier(&[Access::StorageWrite], &[Access::TransferRead, Access::SampledRead]);
+            }
+        }
+        rec.submit_and_wait()?;
+        self.stale = Stale::ALL;
+        let opacity = self.held.opacity();
+        let values = read_values(&self.gpu, opacity)?;
+        let settings = self.settings();
+        let trial = Trial::new(&self.gpu, &self.field, opacity, settings.scope, settings.reference_mm)?;
+        Ok((trial, values))
     }
 
     /// What the left and the right eye read at world points in mm, in the order given. Refuses while the ambient volume is out of date.
@@ -519,59 +732,68 @@ impl Renderer {
         let mut rec = self.gpu.recorder("frame")?;
         self.frame.record(&mut rec, &self.field, views, look, self.settings().reference_mm)?;
         rec.submit_and_wait()?;
-        let v = &self.volumes;
-        Consistency::new(&self.gpu)?.run(&self.gpu, &self.frame, &v.opacity, &v.ambient, points)
+        let (opacity, ambient) = (self.held.opacity(), self.held.ambient());
+        Consistency::new(&self.gpu)?.run(&self.gpu, &self.frame, opacity, ambient, points)
     }
 
-    /// Voxels of each category after the last update. Uses the device's queue and waits for it.
+    /// Voxels of each category after the last update; a sweep tells recomputed bricks from others only, and counts nothing as
+    /// clipped. Uses the device's queue and waits for it.
     pub fn categories(&self) -> Result<Categories> {
-        let count = &self.kernels.classify.count;
-        let read_back = self.gpu.buffer("count read-back", count.bytes(), BufferUse::Readback)?;
-        let mut rec = self.gpu.recorder("read count")?;
-        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
-        rec.copy_buffer(count, 0, &read_back, 0, count.bytes())?;
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-        rec.submit_and_wait()?;
-        let [clipped, affected, untouched] = bytemuck::pod_read_unaligned(&read_back.read(0, 12)?);
-        Ok(Categories { clipped, affected, untouched })
+        match &self.held {
+            Held::Cast(cast) => {
+                let [clipped, affected, untouched] =
+                    bytemuck::pod_read_unaligned(&self.read_buffer(&cast.0.classify.count)?);
+                Ok(Categories { clipped, affected, untouched })
+            }
+            Held::Swept(_) => {
+                let mask = self.read_mask()?;
+                let affected = mask.iter().filter(|category| **category == 1).count() as u32;
+                Ok(Categories { clipped: 0, affected, untouched: mask.len() as u32 - affected })
+            }
+        }
     }
 
     /// V_AO, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_ambient(&self) -> Result<Vec<f32>> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read_volume(&self.volumes.ambient)?))
+        self.current()?;
+        read_values(&self.gpu, self.held.ambient())
     }
 
     /// V_o after clipping, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_opacity(&self) -> Result<Vec<f32>> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read_volume(&self.volumes.opacity)?))
-    }
-
-    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched. Refuses while out of date. Uses the device's queue and waits
-    /// for it.
-    pub fn read_mask(&self) -> Result<Vec<u8>> {
-        self.read_volume(&self.volumes.mask)
-    }
-
-    /// Texels of a volume, slices at a time so that no buffer exceeds a device's limits.
-    fn read_volume(&self, image: &Image) -> Result<Vec<u8>> {
         self.current()?;
-        let [x, y, z] = self.field.dims;
-        let slice = u64::from(x) * u64::from(y) * image.desc().format.bytes();
-        let slices = ((64 << 20) / slice).clamp(1, u64::from(z)) as u32;
-        let read_back =
-            self.gpu.buffer("volume read-back", slice * u64::from(slices), BufferUse::Readback)?;
-        let mut all = Vec::with_capacity((slice * u64::from(z)) as usize);
-        let mut first = 0;
-        while first < z {
-            let count = slices.min(z - first);
-            let mut rec = self.gpu.recorder("read volume")?;
-            rec.copy_image_to_buffer(image, 0, [0, 0, first], [x, y, count], &read_back, 0)?;
-            rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-            rec.submit_and_wait()?;
-            all.extend(read_back.read(0, slice * u64::from(count))?);
-            first += count;
+        read_values(&self.gpu, self.held.opacity())
+    }
+
+    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of a sweep 1 in the bricks that the last update computed and 2
+    /// elsewhere. Refuses while out of date. Uses the device's queue and waits for it.
+    pub fn read_mask(&self) -> Result<Vec<u8>> {
+        self.current()?;
+        match &self.held {
+            Held::Cast(cast) => read_texels(&self.gpu, &cast.1.mask),
+            Held::Swept(swept) => {
+                let todo: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read_buffer(&swept.1.todo)?);
+                let ([x, y, z], [bx, by, _]) = (self.field.dims, self.field.bricks());
+                let mut mask = Vec::with_capacity((x * y * z) as usize);
+                for k in 0..z {
+                    for j in 0..y {
+                        let row = (k / BRICK * by + j / BRICK) * bx;
+                        mask.extend((0..x).map(|i| 2 - todo[(row + i / BRICK) as usize] as u8));
+                    }
+                }
+                Ok(mask)
+            }
         }
-        Ok(all)
+    }
+
+    fn read_buffer(&self, buffer: &Buffer) -> Result<Vec<u8>> {
+        let read_back = self.gpu.buffer("read-back", buffer.bytes(), BufferUse::Readback)?;
+        let mut rec = self.gpu.recorder("read buffer")?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        rec.copy_buffer(buffer, 0, &read_back, 0, buffer.bytes())?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        read_back.read(0, buffer.bytes())
     }
 
     /// The device.

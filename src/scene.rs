@@ -139,19 +139,39 @@ pub enum Method {
     Lao,
     /// Contextual: only voxels that the clip affects; equal to [`Method::Lao`] bit for bit.
     Cao,
+    /// Line sweeps along lattice directions, only where opacities changed; equal to sweeping everything bit for bit.
+    Sweep,
 }
 
 impl Method {
-    /// `lao` or `cao`.
+    /// The rule that it integrates rays by unless another is asked for; a sweep has only this one.
+    pub fn quadrature(self) -> Quadrature {
+        match self {
+            Self::Lao | Self::Cao => Quadrature::Left,
+            Self::Sweep => Quadrature::Segment,
+        }
+    }
+
+    /// Every method.
+    pub const ALL: [Self; 3] = [Self::Lao, Self::Cao, Self::Sweep];
+
+    /// Name on the command line and in scene files: `lao`, `cao`, `sweep`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lao => "lao",
+            Self::Cao => "cao",
+            Self::Sweep => "sweep",
+        }
+    }
+
+    /// The method called `name`.
     ///
     /// # Errors
     /// [`Error::Config`] for any other name.
     pub fn parse(name: &str) -> Result<Self> {
-        match name {
-            "lao" => Ok(Self::Lao),
-            "cao" => Ok(Self::Cao),
-            _ => Err(refused("method", format!("{name:?}: expected lao or cao"))),
-        }
+        Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
+            refused("method", format!("{name:?}: expected {}", Self::ALL.map(Self::name).join(", ")))
+        })
     }
 }
 
@@ -609,10 +629,11 @@ impl OcclusionFile {
         ] {
             length(key, value, zero)?;
         }
-        let method = self.method.as_deref().map_or(Ok(default.method), Method::parse);
-        let quadrature = self.quadrature.as_deref().map_or(Ok(default.quadrature), Quadrature::parse);
+        let method =
+            self.method.as_deref().map_or(Ok(default.method), Method::parse).map_err(in_occlusion)?;
+        let quadrature = self.quadrature.as_deref().map_or(Ok(method.quadrature()), Quadrature::parse);
         Ok(OcclusionSettings {
-            method: method.map_err(in_occlusion)?,
+            method,
             needed_only,
             rays,
             quadrature: quadrature.map_err(in_occlusion)?,

@@ -134,6 +134,7 @@ fn every_run_of_every_method_and_change_is_a_record_whose_parts_fit_together(cha
                         "{record:?}"
                     );
                     assert_eq!(stages > 0.0, method != "solid colour", "{record:?}");
+                    assert!(!record["total_ms"].starts_with('-'), "{record:?}");
                     let (rmse, max) = (number(record, "rmse"), number(record, "max"));
                     assert!(rmse > 0.0 && rmse <= max && max <= 1.0, "{record:?}");
                     assert!(number(record, "bias").abs() <= rmse && number(record, "rmse_shape") <= rmse);
@@ -282,12 +283,17 @@ fn a_scene_that_shows_nothing_or_a_plan_that_measures_nothing_is_refused_by_name
     assert!(said.contains("peers.json"), "{said}");
 }
 
+const SCENE: &str = r#"
+volume = "builtin:engine:16x14x12"
+clip = [{ shape = "plane", rotate_deg = [0, 90, 0], translate_mm = [2, 0, 0] }]
+occlusion = { radius_mm = 3 }
+"#;
+
 #[test]
 fn the_program_writes_all_files_and_says_which() {
     let folder = Folder::with_device();
-    folder.put("peers.json", PEERS);
-    let answer =
-        folder.json("chart builtin:engine:16 --quick --runs 1 --radius-mm 3 --peers peers.json -o chart");
+    folder.put("peers.json", PEERS).put("scene.toml", SCENE);
+    let answer = folder.json("chart scene.toml --quick --runs 1 --peers peers.json -o chart");
     assert_eq!(answer["files"].as_array().unwrap().len(), 4);
     let mut names: Vec<_> = std::fs::read_dir(folder.path("chart"))
         .unwrap()
@@ -300,7 +306,9 @@ fn the_program_writes_all_files_and_says_which() {
         assert!(points.iter().any(|p| p["method"] == method), "{method}");
     }
     let report = std::fs::read_to_string(folder.path("chart/report.html")).unwrap();
-    assert!(report.contains("builtin:engine:16") && report.contains("plain &amp; simple"));
+    // What the scene says, and not what is done where it says nothing.
+    assert!(report.contains("scene.toml: 16 x 14 x 12 voxels, radius 3 mm, clip plane"));
+    assert!(report.contains("plain &amp; simple"));
     assert_eq!(references(&report), [""; 0]);
 }
 
@@ -322,6 +330,7 @@ fn what_cannot_be_charted_is_refused_by_name_and_leaves_nothing() {
         ("chart --peers absent.json -o out", 1, "absent.json"),
         ("chart --peers peers.json -o out", 1, "peers.json"),
         ("chart builtin:engine:16 --transfer shiny -o out", 1, "shiny"),
+        ("chart scene.toml --dims 4,4,4 --type uint8 -o out", 2, "--dims: the scene scene.toml"),
         // Everything is well but for the device.
         ("chart builtin:engine:16 -o out", 1, "Vulkan"),
     ] {

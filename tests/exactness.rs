@@ -13,7 +13,7 @@ use cao::scene::Method;
 use cao::stage::bricks::{BrickList, Bricks, Which};
 use cao::stage::classify::AntiAliasing;
 use cao::stage::clips::MapSettings;
-use cao::stage::compare::{Compare, Difference};
+use cao::stage::compare::{Compare, Difference, Recomputed};
 use cao::stage::eyes::Look;
 use cao::stage::field::Field;
 use cao::stage::lao::Scope;
@@ -354,7 +354,7 @@ fn planted_differences_are_all_reported() {
         let before = buffer(&gpu, "changed before", &vec![0; 4 * field.brick_count() as usize]);
         let which = if scope == Scope::All { Which::All } else { Which::Needed };
         run(&gpu, |rec| bricks.record(rec, field, which, &opacity, &mask, &before, &list).unwrap());
-        compare.run(&gpu, field, scope, &list, &opacity, &mask, &expected, &actual).unwrap()
+        compare.run(&gpu, field, scope, &list, &opacity, Recomputed::Mask(&mask), &expected, &actual).unwrap()
     };
     let mut random = Random::new(SEED);
     for grid in GRIDS {

@@ -14,17 +14,18 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("transfer.rs", &["error"]),
     ("mesh.rs", &["error"]),
     ("occlusion.rs", &["error"]),
+    ("lattice.rs", &["occlusion"]),
     ("clip.rs", &["error", "mesh"]),
     ("scene.rs", &["error", "view", "transfer", "mesh", "occlusion", "clip"]),
     // Files.
     ("volume/", &["error", "view", "transfer", "mesh", "occlusion", "clip", "scene"]),
     ("picture.rs", &["error", "volume"]),
     // The truth. Its tests may use everything it may.
-    ("cpu/", &["error", "view", "transfer", "mesh", "occlusion", "clip", "scene", "volume"]),
+    ("cpu/", &["error", "view", "transfer", "mesh", "occlusion", "lattice", "clip", "scene", "volume"]),
     // Vulkan knows no volume and no method.
     ("gpu/", &["error"]),
     // Kernels' host sides; the only one that knows a volume copies it to the device.
-    ("stage/", &["error", "view", "transfer", "mesh", "occlusion", "clip", "gpu"]),
+    ("stage/", &["error", "view", "transfer", "mesh", "occlusion", "lattice", "clip", "gpu"]),
     ("stage/field.rs", &["error", "volume", "gpu"]),
     ("method/", &["error", "occlusion", "gpu", "stage"]),
     (

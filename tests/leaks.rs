@@ -129,7 +129,7 @@ fn failures_in_the_middle_leave_nothing_behind() {
         assert_eq!(summary(&gpu).0, before);
     }
     let views = StereoRig::framing(volume.size_mm(), 0.0, 0.0).views(1.0, 1.0, 500.0).unwrap();
-    let look = Look { opaque: 0.0, ..Look::default() };
+    let look = Look { tolerance: -1.0, ..Look::default() };
     one.draw(&views, &look, [16, 16]).unwrap_err();
     one.draw(&views, &Look::default(), [0, 16]).unwrap_err();
     one.draw(&views, &Look::default(), [1 << 20, 16]).unwrap_err();

@@ -6,13 +6,15 @@ mod common;
 use cao::clip::{Clip, Mode, Pose, Shape};
 use cao::cpu::clips::{ClipField, Dilation, Maps};
 use cao::cpu::{self, Grid};
-use cao::gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use cao::measure::random::Random;
 use cao::method::volumes::Volumes;
 use cao::occlusion::{Occlusion, Quadrature, RaySet};
 use cao::renderer::{COLOUR, Renderer, Setup, StereoImage};
 use cao::scene::{Method, Shading};
+use cao::stage::brick_distance::BrickDistance;
 use cao::stage::classify::AntiAliasing;
+use cao::stage::clip_bricks::ClipBricks;
 use cao::stage::clips::{ClipSet, MapSettings};
 use cao::stage::dilate::Dilate;
 use cao::stage::eyes::{FrameBuffer, Look};
@@ -35,7 +37,7 @@ const SIZE: [u32; 2] = [47, 41];
 
 /// What a colour component (0 ... about 1) of a pixel may be off by. The kernel snaps positions in V_AO to 1/256 voxel, over
 /// which a factor shown twice over changes by up to 2 · √3/512; the opacities of some hundred samples round to f32 and
-/// end the ray one sample earlier or later, at 1 − 0.99 of the light.
+/// end the ray one sample earlier or later, at less than 1/100 of the light.
 const COLOUR_TOLERANCE: f32 = 2.0 * 0.0034 + 0.01;
 
 /// The same for Vulkan depth, which ranges over 0 ... 1 between near and far: one sample earlier or later.
@@ -427,7 +429,7 @@ fn views_that_do_not_fit_are_refused_by_name() {
     close(gpu);
 }
 
-/// Everything that the kernel reads, apart from the renderer, so that occupancy can be replaced.
+/// Everything that the kernel reads, apart from the renderer, so that the leaps can be replaced.
 struct Stages {
     field: Field,
     volumes: Volumes,
@@ -435,6 +437,7 @@ struct Stages {
     clips: ClipSet,
     frame: FrameBuffer,
     raycast: Raycast,
+    distances: Buffer,
 }
 
 impl Stages {
@@ -446,9 +449,12 @@ impl Stages {
             clips: ClipSet::new(gpu).unwrap(),
             frame: FrameBuffer::new(gpu).unwrap(),
             raycast: Raycast::new(gpu, COLOUR).unwrap(),
+            distances: BrickDistance::buffer(gpu, &field).unwrap(),
             field,
         };
         let (opacity, occupancy) = (Opacity::new(gpu).unwrap(), Occupancy::new(gpu).unwrap());
+        let clip_bricks = ClipBricks::new(gpu).unwrap();
+        let distance = BrickDistance::new(gpu, &stages.field).unwrap();
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
         stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, 50.0, MAPS).unwrap();
@@ -459,26 +465,35 @@ impl Stages {
             rec.barrier(&[], &[Access::StorageWrite]);
             opacity.record(rec, &stages.field, &stages.transfer, &volumes.full_opacity).unwrap();
             occupancy.record(rec, &stages.field, &stages.transfer, &volumes.occupancy).unwrap();
+            clip_bricks.record(rec, &stages.field, &stages.clips, 2.0, &volumes.clip_bricks).unwrap();
+            rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+            distance
+                .record(rec, &stages.field, &volumes.occupancy, &volumes.clip_bricks, &stages.distances)
+                .unwrap();
         });
         stages
     }
 
-    /// Left and right colour and depth as bytes, with the bricks' own occupancy or with all of them occupied.
-    fn draw(&self, gpu: &Gpu, views: &[View; 2], look: &Look, skip: bool) -> Vec<Vec<u8>> {
+    /// The words of the bricks' distances.
+    fn distances(&self, gpu: &Gpu) -> Vec<u32> {
+        bytemuck::pod_collect_to_vec(&read_buffer(gpu, &self.distances))
+    }
+
+    /// Left and right colour and depth as bytes, with these words of the bricks' distances.
+    fn draw(&self, gpu: &Gpu, views: &[View; 2], look: &Look, distances: &[u32]) -> Vec<Vec<u8>> {
         let attachment = |format| {
             let usage = ImageUse::ATTACHMENT;
             let dims = [SIZE[0], SIZE[1], 1];
             gpu.image("eyes", &ImageDesc { dims, layers: 2, format, kind: ImageKind::D2, usage }).unwrap()
         };
         let (colour, depth) = (attachment(COLOUR), attachment(Format::D32Float));
-        let full = buffer(gpu, "all", bytemuck::cast_slice(&vec![1_u32; self.field.brick_count() as usize]));
-        let occupancy = if skip { &self.volumes.occupancy } else { &full };
+        let distances = buffer(gpu, "words", bytemuck::cast_slice(distances));
         let bindings = Bindings {
             field: &self.field,
             transfer: &self.transfer,
             opacity: &self.volumes.full_opacity,
             ambient: &self.volumes.ambient,
-            occupancy,
+            distances: &distances,
             clips: &self.clips,
             frame: &self.frame,
         };
@@ -505,60 +520,193 @@ impl Stages {
     }
 }
 
-/// Skipping bricks that show nothing changes no bit of a picture; also along axes and brick borders.
+/// The word of a brick that no ray leaps over and that every clip may cut.
+const NO_LEAP: u32 = 0xff << 24;
+
+/// Distances of a word: to the nearest brick with opacity, and to the nearest with any that the clips leave.
+fn leaps(word: u32) -> [u32; 2] {
+    [word & 0xfff, word >> 12 & 0xfff]
+}
+
+/// Volumes and clips that leave much to leap over: empty, and wholly clipped.
+fn sparse_scenes() -> Vec<(&'static str, Volume, Vec<Clip>)> {
+    let clip = |shape, mode, at: [f32; 3], scale| {
+        let pose = Pose {
+            translate_mm: at.into(),
+            rotate_deg: Vec3::new(20.0, 0.0, 50.0),
+            scale: Vec3::splat(scale),
+        };
+        Clip { shape, mode, pose }
+    };
+    let tube = clip(Shape::Cylinder, Mode::Remove, [3.0, 0.0, 9.0], 7.0);
+    let slab = clip(Shape::Plane, Mode::Remove, [2.0, 1.0, -3.0], 1.0);
+    let ball = clip(Shape::Sphere, Mode::Keep, [4.0, -3.0, 2.0], 13.0);
+    let hole = clip(Shape::Mesh(concave()), Mode::Remove, [-4.0, 2.0, 3.0], 9.0);
+    // Half a voxel and a little below voxel 16, the face of a brick's box; to a ray the brick begins at 16 itself, so that long
+    // steps come out of it and of the clip at once.
+    let mut flat = clip(Shape::Plane, Mode::Remove, [0.0, 0.0, 15.49 - 12.5], 1.0);
+    flat.pose.rotate_deg = Vec3::ZERO;
+    let volume = |name, dims, spacing| builtin_box(name, dims, spacing).unwrap();
+    vec![
+        ("flat", volume("engine", [40, 33, 26], [1.0; 3]), vec![flat]),
+        ("skeleton", volume("skeleton", [41, 33, 50], [1.0, 1.0, 0.8]), vec![tube.clone()]),
+        ("engine", volume("engine", [40, 33, 26], [1.0; 3]), vec![tube.clone(), slab.clone()]),
+        ("fruit", volume("fruit", [44, 40, 41], [1.0; 3]), vec![slab, hole]),
+        ("block", volume("engine", [48, 48, 40], [1.0; 3]), vec![ball]),
+        ("voxel", volume("voxel", [33; 3], [1.0; 3]), vec![tube]),
+    ]
+}
+
+/// Pairs of views on a volume: along axes and brick borders, and from anywhere.
+fn pairs_of_views(random: &mut Random, volume: &Volume) -> Vec<[View; 2]> {
+    let even = Tangents { left: -0.4, right: 0.4, up: 0.4, down: -0.4 };
+    let along =
+        |position, orientation| View { position, orientation, tan: even, near_mm: 1.0, far_mm: 200.0 };
+    let mut pairs = vec![
+        // Along an axis through voxel centres: column 23 of 47 and row 20 of 41 have a direction of 0; in a volume of
+        // 33 voxels they run in the border of two bricks.
+        [along(Vec3::new(0.0, 0.0, 70.0), Quat::IDENTITY), along(Vec3::new(8.0, 8.0, 70.0), Quat::IDENTITY)],
+        [along(Vec3::ZERO, Quat::IDENTITY), along(Vec3::new(-8.0, 0.0, 0.0), Quat::IDENTITY)],
+    ];
+    for _ in 0..4 {
+        pairs.push(framing(volume, random.between(0.0, 360.0), random.between(-80.0, 80.0)));
+    }
+    pairs
+}
+
+/// Texels that differ between two pictures.
+fn differing(a: &[Vec<u8>], b: &[Vec<u8>]) -> usize {
+    let texels = |part: usize| if part < 2 { 16 } else { 4 };
+    let differ = |part: usize| {
+        a[part].chunks(texels(part)).zip(b[part].chunks(texels(part))).filter(|(a, b)| a != b).count()
+    };
+    (0..a.len()).map(differ).sum()
+}
+
+/// Leaping over bricks that show nothing, and asking only the clips that cut a brick, changes no bit of a picture; also along
+/// axes and brick borders, and at the cuts behind what is leapt over.
 #[test]
-fn skipping_empty_space_changes_no_bit() {
+fn leaping_over_empty_and_clipped_space_changes_no_bit() {
     const SEED: u64 = 31;
     let gpu = open();
     let mut random = Random::new(SEED);
-    for (name, dims, spacing) in [
-        ("skeleton", [41, 33, 50], [1.0, 1.0, 0.8]),
-        ("engine", [40, 33, 26], [1.0; 3]),
-        ("voxel", [33; 3], [1.0; 3]),
-    ] {
-        let volume = builtin_box(name, dims, spacing).unwrap();
+    let mut hidden = 0;
+    for (name, volume, clips) in sparse_scenes() {
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-        let pose =
-            Pose { translate_mm: Vec3::new(3.0, 0.0, 9.0), scale: Vec3::splat(7.0), ..Pose::default() };
-        let clips = [Clip { shape: Shape::Cylinder, mode: Mode::Remove, pose }];
         let stages = Stages::new(&gpu, &volume, &transfer, &clips);
-        let empty = read_buffer(&gpu, &stages.volumes.occupancy);
-        let empty = bytemuck::pod_collect_to_vec::<u8, u32>(&empty).iter().filter(|&&o| o == 0).count();
-        assert!(empty > 10, "{name}: only {empty} bricks to skip");
-        let even = Tangents { left: -0.4, right: 0.4, up: 0.4, down: -0.4 };
-        let along =
-            |position, orientation| View { position, orientation, tan: even, near_mm: 1.0, far_mm: 200.0 };
-        let mut pairs = vec![
-            // Along an axis through voxel centres: column 23 of 47 and row 20 of 41 have a direction of 0; in a volume of
-            // 33 voxels they run in the border of two bricks.
-            [
-                along(Vec3::new(0.0, 0.0, 70.0), Quat::IDENTITY),
-                along(Vec3::new(8.0, 8.0, 70.0), Quat::IDENTITY),
-            ],
-            [along(Vec3::ZERO, Quat::IDENTITY), along(Vec3::new(-8.0, 0.0, 0.0), Quat::IDENTITY)],
-        ];
-        for _ in 0..6 {
-            pairs.push(framing(&volume, random.between(0.0, 360.0), random.between(-80.0, 80.0)));
-        }
+        let words = stages.distances(&gpu);
+        let empty = words.iter().filter(|&&word| leaps(word)[1] > 0).count();
+        assert!(empty > 10, "{name}: only {empty} bricks to leap over");
+        hidden += words.iter().filter(|&&word| leaps(word)[0] == 0 && leaps(word)[1] > 0).count();
+        let every_sample = vec![NO_LEAP; words.len()];
         let mut shown = 0;
-        for (n, views) in pairs.iter().enumerate() {
-            for (jitter, step) in [(false, 0.5), (true, 0.31)] {
+        for (n, views) in pairs_of_views(&mut random, &volume).iter().enumerate() {
+            for (jitter, step) in [(false, 0.5), (true, 0.31), (true, 0.95)] {
                 let look = Look { jitter, step_mm: Some(step), ..Look::default() };
-                let (skipped, every) =
-                    (stages.draw(&gpu, views, &look, true), stages.draw(&gpu, views, &look, false));
-                for (part, (a, b)) in skipped.iter().zip(&every).enumerate() {
-                    let texel = if part < 2 { 16 } else { 4 };
-                    let differ = a.chunks(texel).zip(b.chunks(texel)).filter(|(a, b)| a != b).count();
-                    assert_eq!(
-                        differ, 0,
-                        "{name} seed {SEED} views {n} jitter {jitter} part {part}: {:?}",
-                        views[0]
-                    );
-                    shown += a.iter().filter(|&&byte| byte != 0).count();
-                }
+                let leapt = stages.draw(&gpu, views, &look, &words);
+                let every = stages.draw(&gpu, views, &look, &every_sample);
+                let differ = differing(&leapt, &every);
+                assert_eq!(differ, 0, "{name} seed {SEED} views {n} jitter {jitter}: {:?}", views[0]);
+                shown += every[..2].iter().flatten().filter(|&&byte| byte != 0).count();
             }
         }
-        assert!(shown > 0);
+        assert!(shown > 0, "{name}");
     }
+    assert!(hidden > 20, "only {hidden} bricks with opacity are wholly clipped");
+    close(gpu);
+}
+
+/// Distances that are one too large skip what shows; those that take a clipped brick for an empty one lose its cuts.
+#[test]
+fn a_wrong_distance_is_caught() {
+    let gpu = open();
+    let mut random = Random::new(32);
+    let (mut too_far, mut no_cut, mut not_asked) = (0, 0, 0);
+    for (_, volume, clips) in sparse_scenes() {
+        let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+        let stages = Stages::new(&gpu, &volume, &transfer, &clips);
+        let words = stages.distances(&gpu);
+        let further = |word: &u32| if leaps(*word)[1] == 0 { *word } else { word + (1 << 12) };
+        let for_empty = |word: &u32| word & !0xfff | leaps(*word)[1];
+        let further: Vec<u32> = words.iter().map(further).collect();
+        let for_empty: Vec<u32> = words.iter().map(for_empty).collect();
+        let uncut: Vec<u32> = words.iter().map(|word| word & !NO_LEAP).collect();
+        let look = Look { step_mm: Some(0.95), ..Look::default() };
+        for views in &pairs_of_views(&mut random, &volume) {
+            let right = stages.draw(&gpu, views, &look, &words);
+            too_far += differing(&right, &stages.draw(&gpu, views, &look, &further));
+            no_cut += differing(&right, &stages.draw(&gpu, views, &look, &for_empty));
+            not_asked += differing(&right, &stages.draw(&gpu, views, &look, &uncut));
+        }
+    }
+    assert!(too_far > 100 && no_cut > 10 && not_asked > 100, "{too_far} {no_cut} {not_asked}");
+    close(gpu);
+}
+
+/// sRGB level (0 ... 255, not rounded) of a premultiplied linear component over a background.
+fn level(component: f32, alpha: f32, background: f32) -> f32 {
+    let linear = (component + (1.0 - alpha) * background).clamp(0.0, 1.0);
+    let coded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    255.0 * coded
+}
+
+/// Rounding of the sums of some hundred f32 samples, in levels: 2^-24 each, spread by the slope of sRGB coding at 0.
+const LEVEL_ROUNDING: f32 = 100.0 * 255.0 * 12.92 * 6e-8;
+
+/// A ray that ends early shows, to half a level of an 8-bit picture over any background, what the whole ray shows; a tolerance of
+/// several levels does not, so that the comparison can tell.
+#[test]
+fn a_ray_that_ends_early_changes_no_pixel_by_more_than_half_a_level() {
+    let gpu = open();
+    let volume = in_floats(&builtin_box("engine", [32, 30, 31], [1.0; 3]).unwrap());
+    let (low, high) = volume.range();
+    let at = |share: f64| (low + share * (high - low)) as f32;
+    let white = vec![[0.0, 1.0, 1.0, 1.0]];
+    // The last is dark all the way to a bright end, where sRGB coding is steepest and most is still to come.
+    let dark = vec![[at(0.2), 0.0, 0.0, 0.0], [at(0.6), 1e-4, 2e-4, 1e-4], [at(1.0), 1.0, 1.0, 1.0]];
+    let steep = vec![[at(0.2), 0.0], [at(0.3), 0.9]];
+    let faint = vec![[at(0.1), 0.0], [at(0.4), 0.35]];
+    let (mut ended, mut loose) = (0, 0.0_f32);
+    for (opacity, colour) in
+        [(steep.clone(), white.clone()), (faint.clone(), white), (steep, dark.clone()), (faint, dark)]
+    {
+        let transfer = TransferFunction::new(opacity, colour, None).unwrap();
+        let mut renderer = Renderer::new(&gpu, &volume, transfer, setup(MAPS), COLOUR).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+        for turn in 0..3 {
+            let views = framing(&volume, 70.0 * turn as f32, 35.0 - 30.0 * turn as f32);
+            let draw = |tolerance| {
+                let look = Look { tolerance, occluded: turn != 2, step_mm: Some(0.3), ..Look::default() };
+                renderer.draw(&views, &look, SIZE).unwrap().0
+            };
+            let whole = draw(0.0);
+            let worst = |image: &StereoImage| {
+                let mut worst = 0.0_f32;
+                for (a, b) in image.colour.iter().flatten().zip(whole.colour.iter().flatten()) {
+                    for background in [0.0, 0.5, 1.0] {
+                        for c in 0..3 {
+                            worst = worst
+                                .max((level(a[c], a[3], background) - level(b[c], b[3], background)).abs());
+                        }
+                    }
+                }
+                worst
+            };
+            let early = draw(0.5);
+            let off = worst(&early);
+            assert!(off <= 0.5 + LEVEL_ROUNDING, "turn {turn}: {off} levels");
+            assert!(early.depth == whole.depth);
+            ended += early
+                .colour
+                .iter()
+                .flatten()
+                .zip(whole.colour.iter().flatten())
+                .filter(|(a, b)| a != b)
+                .count();
+            loose = loose.max(worst(&draw(8.0)));
+        }
+    }
+    assert!(ended > 1000, "only {ended} rays end early");
+    assert!(loose > 1.0, "{loose} levels");
     close(gpu);
 }

@@ -6,7 +6,7 @@ mod cli_support;
 use cli_support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 
-const METHODS: [&str; 4] = ["solid", "lao", "cao", "cao-literal"];
+const METHODS: [&str; 5] = ["solid", "lao", "cao", "cao-literal", "sweep"];
 
 /// The smallest run that has percentiles and runs to compare.
 const TINY: &str = "builtin:engine:16 --radius-mm 3 --rays 6 --size 32x24 --frames 3 --runs 2 --warm-up 1";
@@ -71,12 +71,15 @@ fn check_method(method: &Value, name: &str, table: &Table) {
         let wall = table.number(row, "frame_ms");
         assert!(sum >= wall - 1e-3 && sum < 1.1 * wall + 0.1, "{name}: {sum} of {wall}");
     }
+    assert_eq!(method["quadrature"], if name == "sweep" { "segment" } else { "left" });
     let stages = method["stages_ms"].as_object().unwrap();
     for (stage, there) in [
-        ("classify", true),
+        ("classify", name != "sweep"),
+        ("carve", name == "sweep"),
         ("raycast", true),
         ("lao", name == "lao"),
-        ("contextual", name != "lao"),
+        ("contextual", !["lao", "sweep"].contains(&name)),
+        ("sweep", name == "sweep"),
         ("opacity", false),
     ] {
         assert_eq!(stages.contains_key(stage), there, "{name}: {stage} in {stages:?}");
@@ -132,6 +135,32 @@ fn every_run_and_method_sees_the_same_frames() {
     assert!(frames[0] != frames[1] || frames[1] != frames[2], "nothing moves: {frames:?}");
 }
 
+/// Another program can draw the same frames: what they show is said, and is where the documentation of the path has it.
+#[test]
+fn the_answer_says_what_each_frame_shows() {
+    let answer = bench().json(&format!("{TINY} --methods solid --clip plane"));
+    let path = &answer["path"];
+    assert_eq!(number(&path["step_mm"]), 0.25, "a quarter of the smallest spacing");
+    assert!(path["light"].is_array() && number(&path["ambient"]) > 0.0 && number(&path["diffuse"]) > 0.0);
+    let frames = path["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3);
+    // At the start of the path, in a volume of 16 mm.
+    assert_eq!(frames[0]["clip"]["translate_mm"], json!([4.0, 0.0, 0.0]));
+    assert_eq!(frames[0]["clip"]["rotate_deg"], json!([0.0, 0.0, 0.0]));
+    assert_ne!(frames[0]["clip"], frames[1]["clip"]);
+    for frame in frames {
+        let views = frame["views"].as_array().unwrap();
+        assert_eq!(views.len(), 2);
+        assert_ne!(views[0]["position_mm"], views[1]["position_mm"]);
+        let tan = |view: &Value, side: &str| number(&view["tan"][side]);
+        // Each eye's field of view is shifted towards the other's side.
+        assert!(tan(&views[0], "left") + tan(&views[0], "right") > 0.0);
+        assert!(tan(&views[1], "left") + tan(&views[1], "right") < 0.0);
+    }
+    let still = bench().json(&format!("{TINY} --methods solid --clip none"));
+    assert_eq!(still["path"]["frames"][0]["clip"], Value::Null);
+}
+
 #[test]
 fn any_shape_can_move_also_a_mesh_and_nothing() {
     let folder = bench();
@@ -156,7 +185,7 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid lao cao cao-literal, rays 6"),
+        ("method", "solid lao cao cao-literal sweep, rays 6"),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),
@@ -173,7 +202,7 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
 }
 
 #[test]
-fn series_vary_one_setting_and_measure_once_what_they_share() {
+fn series_vary_one_setting_at_a_time() {
     let folder = bench();
     let answer = folder.json(
         "builtin:engine:16 --radius-mm 4 --size 32x24 --frames 1 --runs 1 --warm-up 0 --methods solid,cao \
@@ -200,16 +229,29 @@ fn series_vary_one_setting_and_measure_once_what_they_share() {
         let points = scale[series].as_array().unwrap();
         let of = |key: &str| Value::from(points.iter().map(|point| point[key].clone()).collect::<Vec<_>>());
         assert_eq!((of("value"), of(key)), (values, settings), "{series}");
-        assert!(points.iter().all(|point| point["methods"].as_array().unwrap().len() == 2), "{series}");
+        let methods = |point: &Value| point["methods"].as_array().unwrap().clone();
+        for (method, name) in ["solid", "cao"].into_iter().enumerate() {
+            assert!(points.iter().all(|point| methods(point)[method]["method"] == name), "{series}");
+            // One frame each: the ratio of the two.
+            let time = |point| number(&methods(point)[method]["median_ms"]);
+            for point in points {
+                let growth = number(&methods(point)[method]["over_first_of_series"]);
+                assert!((growth / (time(point) / time(&points[0])) - 1.0).abs() < 1e-9, "{series} {name}");
+            }
+        }
         // All but what is varied is as in the base configuration.
         for other in ["dims", "rays", "radius_mm", "view_size", "views"].iter().filter(|other| **other != key)
         {
             assert!(points.iter().all(|point| point[other] == answer[other]), "{series} changes {other}");
         }
     }
-    // The base, and what each series has beside it; two methods.
     let table = Table::read(&std::fs::read_to_string(folder.path("all.csv")).unwrap());
-    assert_eq!(table.rows.len(), 2 * (1 + 3 + 3 + 3 + 3 + 2));
+    for (series, points) in
+        [("base", 1), ("size", 4), ("rays", 4), ("radius", 4), ("resolution", 4), ("views", 3)]
+    {
+        let rows = table.rows.iter().filter(|row| table.at(row, "series") == series);
+        assert_eq!(rows.count(), 2 * points, "{series}: two methods, one frame each");
+    }
 }
 
 #[test]
@@ -251,7 +293,7 @@ fn what_cannot_be_measured_is_refused_before_a_device_is_asked_for() {
     folder.put("cube.nrrd", nrrd("uchar", "2 2 2", "1 1 1", &[0, 50, 100, 150, 200, 250, 20, 30]));
     for (arguments, code, words) in [
         ("--views 3", 2, "expected 1, 2 or 4"),
-        ("--methods lao,vray", 2, "expected one of solid, lao, cao, cao-literal"),
+        ("--methods lao,vray", 2, "expected one of solid, lao, cao, cao-literal, sweep"),
         ("--methods lao,lao", 2, "lao is given twice"),
         ("--scale colour", 2, "expected one of size, rays, radius, resolution, views"),
         ("--scale rays,rays", 2, "rays is given twice"),

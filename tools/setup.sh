@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Set-up shared by tools/demo, tools/test, tools/get-data and .ci/run; sourced, not run.
+# Set-up shared by tools/demo, tools/test, tools/get-data, tools/peers and .ci/run; sourced, not run.
 #
 # It looks first and installs only what is missing, so a second run touches no package manager. Progress goes to
 # stderr in short lines; a package manager's own output is shown only when it fails.
@@ -22,6 +22,8 @@ loader        libvulkan1               vulkan-loader             vulkan-icd-load
 driver        mesa-vulkan-drivers      mesa-vulkan-drivers       vulkan-swrast             Vulkan_device_or_driver
 validation    vulkan-validationlayers  vulkan-validation-layers  vulkan-validation-layers  Vulkan_validation_layer
 spirv         spirv-tools              spirv-tools               spirv-tools               spirv-val
+python        python3_python3-venv     python3                   python                    Python_3_with_venv
+opengl        libegl1_libgl1           mesa-libEGL_mesa-libGL    mesa_libglvnd             OpenGL_without_a_window_(EGL)
 TABLE
 }
 
@@ -93,15 +95,20 @@ has_certificates() {
     [ -e /etc/ssl/certs/ca-certificates.crt ] || [ -e /etc/pki/tls/certs/ca-bundle.crt ] || [ -e /etc/ssl/cert.pem ]
 }
 
-has_loader() {
+has_library() { # name of a shared library as the linker knows it
   local ldconfig=ldconfig directory
   have ldconfig || ldconfig=/sbin/ldconfig # not on a Debian user's PATH
-  "$ldconfig" -p 2>/dev/null | grep 'libvulkan\.so\.1' >/dev/null && return 0 # no -q: it would break the pipe
+  "$ldconfig" -p 2>/dev/null | grep -F "$1" >/dev/null && return 0 # no -q: it would break the pipe
   while read -r -d : directory; do
-    if [ -n "$directory" ] && [ -e "$directory/libvulkan.so.1" ]; then return 0; fi
+    if [ -n "$directory" ] && [ -e "$directory/$1" ]; then return 0; fi
   done <<<"${LD_LIBRARY_PATH:-}:"
   return 1
 }
+
+has_loader() { has_library libvulkan.so.1; }
+has_opengl() { has_library libEGL.so.1 && has_library libGL.so.1; }
+# Debian has both modules apart from Python, and venv without ensurepip makes an environment that can install nothing.
+has_python() { have python3 && python3 -c 'import ensurepip, venv' 2>/dev/null; }
 
 has_validation() {
   local layers directory
@@ -152,12 +159,17 @@ build() { # cargo build's arguments
   cargo build "${quiet_cargo[@]}" --release --locked "$@"
 }
 
-# Runs the program that build made, as it lies: `cargo run` would first build it again with other features.
+# Where build puts what it makes.
 target_directory=
-cao() {
+find_target() {
   [ -n "$target_directory" ] ||
     target_directory=$(cargo metadata --format-version 1 --no-deps --locked |
       sed 's/.*"target_directory":"\([^"]*\)".*/\1/')
+}
+
+# Runs the program that build made, as it lies: `cargo run` would first build it again with other features.
+cao() {
+  find_target
   "$target_directory/release/cao" "$@"
 }
 

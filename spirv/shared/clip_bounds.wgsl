@@ -1,23 +1,7 @@
 // What the clips do to a whole box of points, from bounds instead of samples (method.md section 6). Conservative: where the
 // bounds do not decide, the answer is CUT or SOME, and points have to be looked at.
 
-// Visibility of a box's points.
-const HIDDEN = 0u;
-const CUT = 1u;
-const VISIBLE = 2u;
-// As CUT, but no bound of a smaller box would tell more: look at every sample.
-const SAMPLED = 3u;
-
-// Which of a box's points have a point that some clip hides within reach.
-const NONE = 0u;
-const SOME = 1u;
-const ALL = 2u;
-
-// A word a brick of 8x8x8 voxels, x fastest: visibility (2 bits), reach (2 bits), a bit for each clip that cuts the brick (8), and
-// a bit for each clip that reaches some of its voxels (8).
-struct ClipBricks {
-    code: array<u32>,
-}
+#include "shared/clip_codes.wgsl"
 
 // Bounds of rounding: a distance is computed twice, at the box's centre and at a point in it, each time right to
 // `cells.w`, the clip's bound; twice that for the bounds' own operations.

@@ -18,16 +18,6 @@ fn first_nine(i: u32) -> vec3<f32> {
     return vec3<f32>(vec3(corner & 1u, corner >> 1u & 1u, corner >> 2u)) * 2.0 - 1.0;
 }
 
-// Whether none of these clips hides the point: a bit for each.
-fn visible_to(among: u32, world: vec3<f32>) -> bool {
-    for (var c = 0u; c < clips.count; c++) {
-        if (among >> c & 1u) != 0u && inside(c, world) == (clips.clip[c].keep == 0u) {
-            return false;
-        }
-    }
-    return true;
-}
-
 // What the bounds of these clips say of one voxel; of meshes, whose layers only samples decide, nothing.
 fn voxel_visibility(among: u32, centre: vec3<f32>, half_edges: vec3<f32>) -> u32 {
     var all = VISIBLE;

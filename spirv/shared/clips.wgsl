@@ -123,11 +123,16 @@ fn inside(c: u32, world: vec3<f32>) -> bool {
     return local_distance(clips.clip[c].kind, rigid / clips.clip[c].scale.xyz) < 0.0;
 }
 
-fn visible(world: vec3<f32>) -> bool {
+// Whether none of these clips hides the point: a bit for each.
+fn visible_to(among: u32, world: vec3<f32>) -> bool {
     for (var c = 0u; c < clips.count; c++) {
-        if inside(c, world) == (clips.clip[c].keep == 0u) {
+        if (among >> c & 1u) != 0u && inside(c, world) == (clips.clip[c].keep == 0u) {
             return false;
         }
     }
     return true;
+}
+
+fn visible(world: vec3<f32>) -> bool {
+    return visible_to(0xffu, world);
 }

@@ -23,10 +23,11 @@ struct Frame {
     spacing: vec4<f32>,
     // unit vector towards the light; w: reference length of the opacity in mm
     light: vec4<f32>,
-    // ambient and diffuse part, opacity at which a ray ends, value of a texel of 0
+    // ambient and diffuse part, what may remain of a ray's light where a level of the picture is a level of light, value of a
+    // texel of 0
     ambient: f32,
     diffuse: f32,
-    opaque: f32,
+    remainder: f32,
     bias: f32,
     // value = texel * scale + bias
     scale: f32,

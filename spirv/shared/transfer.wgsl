@@ -14,20 +14,28 @@ struct Transfer {
 
 @group(0) @binding(1) var<storage, read> transfer: Transfer;
 
+// Kept between its ends: rounding must not leave 0 ... 1 or exceed what `largest_opacity` promises.
 fn opacity_of(value: f32) -> f32 {
-    var point = transfer.opacity[0];
-    if value < point.x {
+    if value < transfer.opacity[0].x {
+        return transfer.opacity[0].y;
+    }
+    // The first point above the value, by halving: of two equal points the second holds.
+    var low = 1u;
+    var high = transfer.opacity_points;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if value < transfer.opacity[middle].x {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let point = transfer.opacity[low - 1u];
+    if low == transfer.opacity_points {
         return point.y;
     }
-    for (var i = 1u; i < transfer.opacity_points; i++) {
-        let next = transfer.opacity[i];
-        if value < next.x {
-            // Kept between its ends: rounding must not leave 0 ... 1 or exceed what `largest_opacity` promises.
-            return clamp(point.y + (value - point.x) * point.z, min(point.y, next.y), max(point.y, next.y));
-        }
-        point = next;
-    }
-    return point.y;
+    let end = transfer.opacity[low].y;
+    return clamp(point.y + (value - point.x) * point.z, min(point.y, end), max(point.y, end));
 }
 
 // Largest opacity of any value in [low, high]: at one of the ends or at a control point between them.
@@ -43,16 +51,23 @@ fn largest_opacity(low: f32, high: f32) -> f32 {
 }
 
 fn colour_of(value: f32) -> vec3<f32> {
-    var point = transfer.colour[0];
-    if value < point.x {
+    if value < transfer.colour[0].x {
+        return transfer.colour[0].yzw;
+    }
+    var low = 1u;
+    var high = transfer.colour_points;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if value < transfer.colour[middle].x {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let point = transfer.colour[low - 1u];
+    if low == transfer.colour_points {
         return point.yzw;
     }
-    for (var i = 1u; i < transfer.colour_points; i++) {
-        let next = transfer.colour[i];
-        if value < next.x {
-            return mix(point.yzw, next.yzw, (value - point.x) / (next.x - point.x));
-        }
-        point = next;
-    }
-    return point.yzw;
+    let next = transfer.colour[low];
+    return mix(point.yzw, next.yzw, (value - point.x) / (next.x - point.x));
 }

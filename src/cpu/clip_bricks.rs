@@ -77,10 +77,10 @@ mod tests {
     const GRID: Grid = Grid { dims: [8, 8, 40], spacing: [1.0; 3] };
 
     /// The plane z = 0 runs through the third brick of five (voxels 16 … 23, z from −4 to 4); what lies above it is hidden,
-    /// and the reach of 1 mm and a voxel's footprint ends in the same brick.
+    /// and the reach of a voxel's footprint ends in the same brick.
     #[test]
     fn a_plane_cuts_one_brick_of_a_column() {
-        let clip = |mode| [field(&Clip { shape: Shape::Plane, mode, pose: Pose::default() }, &GRID, 1.0)];
+        let clip = |mode| [field(&Clip { shape: Shape::Plane, mode, pose: Pose::default() }, &GRID, 0.0)];
         let [all, cut, none] = [Share::All, Share::Some, Share::None];
         let of = |mode| {
             let found = clip_bricks(&GRID, &clip(mode), 8);

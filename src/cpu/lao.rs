@@ -125,7 +125,7 @@ fn segment(samples: u32, ratio: f64, opacity: impl Fn(u32) -> f64) -> f64 {
 }
 
 /// λ, the mean of −ln q over q from q0 to q1, each in [0, 1], not both 0.
-fn mean_extinction(q0: f64, q1: f64) -> f64 {
+pub(super) fn mean_extinction(q0: f64, q1: f64) -> f64 {
     let mean = (q0 + q1) / 2.0;
     let half = (q1 - q0) / 2.0;
     if half.abs() <= 1e-3 * mean {

@@ -3,19 +3,23 @@
 //! Written from the paper, not from the shaders; not tuned, and no fallback for a missing GPU. Each file opens with
 //! its equation. Geometry that decides visibility (shape distances, depth maps) is f32, as [`crate::clip`] defines it.
 
+pub mod brick_distance;
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod contextual;
 pub mod dilate;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod reference;
 pub mod ssao;
+pub mod sweep;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,10 +5,11 @@
 //! ```text
 //! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
 //! C  += (1 − A) α_k · TF_c(V(p_k)) · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
-//! A  += (1 − A) α_k                                                         until A ≥ 0.99
+//! A  += (1 − A) α_k                                                         until (1 − A)·L·E′(C) ≤ ½/255
 //! ```
 //!
-//! n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
+//! where L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
+//! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
 
 use super::clips::{ClipField, visible};
 use super::{Grid, each, trilinear, trilinear_clamped};
@@ -17,8 +18,8 @@ use crate::transfer::TransferFunction;
 use crate::view::View;
 use glam::{DVec3, Vec2, Vec3};
 
-/// A ray ends when this much is covered.
-pub const OPAQUE: f64 = 0.99;
+/// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
+pub const TOLERANCE: f64 = 0.5;
 /// The ambient factor is shown times this: a flat wall's is ½.
 pub const GAIN: f64 = 2.0;
 /// Below this gradient of opacity per mm there is no surface, and the diffuse term is 1.
@@ -64,7 +65,8 @@ pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
     Image { colour, depth }
 }
 
-/// Index coordinates at which these pixels read the ambient factor, in the order of their rays.
+/// Index coordinates at which these pixels read the ambient factor, in the order of their rays; where a ray ends depends on what it has
+/// read, and these go as far as the darkest does.
 pub fn ambient_positions(
     frame: &Frame,
     view: &View,
@@ -75,7 +77,7 @@ pub fn ambient_positions(
         let mut positions = Vec::new();
         pixel(frame, view, size, pixels[i], &mut |position| {
             positions.push(position);
-            1.0
+            0.0
         });
         positions
     })
@@ -123,6 +125,9 @@ fn pixel(
     let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
     let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
     let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
+    let light = f64::from(frame.shading.ambient) + f64::from(frame.shading.diffuse);
+    // A white background, or a white sample that faces the light.
+    let brightest = 1.0_f64.max(light * if frame.shading.occlusion { GAIN } else { 1.0 });
     let mut hidden_at = f64::NEG_INFINITY;
     for t in samples.take_while(|&t| t < end) {
         if frame.transfer.opacity_at(value_at(t)) == 0.0 {
@@ -147,11 +152,16 @@ fn pixel(
         if depth == 1.0 && alpha >= 0.5 {
             depth = vulkan_depth(view, t / slant);
         }
-        if alpha >= OPAQUE {
+        if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
             break;
         }
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
+}
+
+/// Slope of sRGB coding (IEC 61966-2-1) at a linear component; beyond 1, where a screen shows no more, that at 1.
+fn srgb_slope(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 } else { 1.055 / 2.4 * linear.min(1.0).powf(1.0 / 2.4 - 1.0) }
 }
 
 /// Where a ray comes out of a clip, between a hidden and a visible sample, to 1/16 of their distance: a cut face is

@@ -1,10 +1,12 @@
-//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, and where methods stop holding.
+//! Numbers in, numbers out: whether the claims hold, how far results are from the truth, which settings a budget affords, and
+//! where methods stop holding.
 
 pub mod chart;
 pub mod contender;
 pub mod error;
 pub mod exactness;
 pub mod flip;
+pub mod planner;
 pub mod plot;
 pub mod random;
 pub mod reference;

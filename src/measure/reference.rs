@@ -36,7 +36,7 @@ impl Plan {
     pub const QUICK: Self = Self { directions: 256, steps_per_voxel: 4, max_voxels: 4000 };
 }
 
-/// Voxels that are computed once more at twice the resolution, at most a quarter of them.
+/// Voxels, or pixels, that are computed once more at twice the resolution.
 const CHECKED: usize = 1000;
 
 /// Converged ambient values of a volume.
@@ -89,6 +89,49 @@ pub fn literal(
     volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
 }
 
+/// Ambient reference at voxels in several places, each list of voxels (indices into `opacity`) in a box of the volume of its own,
+/// so that the cost does not depend on the volume's size; in the order given. No convergence is measured. As [`ambient`] otherwise.
+#[expect(clippy::too_many_arguments, reason = "volume, lengths and settings, each named once")]
+pub fn ambient_in(
+    gpu: &Gpu,
+    grid: &Grid,
+    opacity: &[f32],
+    places: &[Vec<usize>],
+    radius_mm: f64,
+    offset_mm: f64,
+    reference_mm: f64,
+    plan: &Plan,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Vec<f32>>> {
+    let integral = integral(radius_mm, offset_mm, grid, plan)?;
+    let kernel = Kernel::new(gpu)?;
+    let mut found = Vec::new();
+    for (i, voxels) in places.iter().enumerate() {
+        let at: Vec<[usize; 3]> = voxels.iter().map(|v| grid.voxel(*v)).collect();
+        // All that a ray interpolates.
+        let reach = |axis: usize| (radius_mm / grid.spacing[axis]).ceil() as usize + 1;
+        let low: [usize; 3] =
+            std::array::from_fn(|a| at.iter().map(|v| v[a]).min().unwrap_or(0).saturating_sub(reach(a)));
+        let high: [usize; 3] = std::array::from_fn(|a| {
+            (at.iter().map(|v| v[a]).max().unwrap_or(0) + reach(a) + 1).min(grid.dims[a])
+        });
+        let part = Grid { dims: std::array::from_fn(|a| high[a] - low[a]), ..*grid };
+        let mut values = Vec::with_capacity(part.len());
+        for z in low[2]..high[2] {
+            for y in low[1]..high[1] {
+                let row = grid.index([low[0], y, z]);
+                values.extend_from_slice(&opacity[row..row + part.dims[0]]);
+            }
+        }
+        let positions: Vec<[f64; 3]> =
+            at.iter().map(|v| std::array::from_fn(|a| (v[a] - low[a]) as f64)).collect();
+        let scene = Scene::new(gpu, &kernel, &part, &values)?;
+        found.push(scene.evaluate(&positions, &integral, reference_mm, &mut |_| ())?.0);
+        progress((i + 1) as f64 / places.len() as f64);
+    }
+    Ok(found)
+}
+
 /// The ambient reference at points of the volume, in index coordinates, rather than at its voxels; no voxels are left out and none is
 /// computed twice. As [`ambient`] otherwise.
 #[expect(clippy::too_many_arguments, reason = "volume, lengths and settings, each named once")]
@@ -104,7 +147,8 @@ pub fn ambient_at(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Vec<f32>> {
     let integral = integral(radius_mm, offset_mm, grid, plan)?;
-    let scene = Scene::new(gpu, grid, opacity)?;
+    let kernel = Kernel::new(gpu)?;
+    let scene = Scene::new(gpu, &kernel, grid, opacity)?;
     Ok(scene.evaluate(points, &integral, reference_mm, progress)?.0)
 }
 
@@ -135,12 +179,12 @@ fn volume(
     plan: &Plan,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Reference> {
-    let scene = Scene::new(gpu, grid, opacity)?;
+    let kernel = Kernel::new(gpu)?;
+    let scene = Scene::new(gpu, &kernel, grid, opacity)?;
     let counts = counting(grid, opacity);
     let all: Vec<usize> = (0..grid.len()).filter(|i| counts[*i]).collect();
     let computed = sample(&all, plan.max_voxels);
-    // Each costs four times as much as the first time.
-    let checked = sample(&computed, CHECKED.min(computed.len().div_ceil(4)));
+    let checked = sample(&computed, CHECKED);
     let centres = |voxels: &[usize]| -> Vec<[f64; 3]> {
         voxels.iter().map(|i| grid.voxel(*i).map(|c| c as f64)).collect()
     };
@@ -211,7 +255,8 @@ pub fn image(
     plan: &Plan,
     progress: &mut dyn FnMut(f64),
 ) -> Result<ImageReference> {
-    let scene = Scene::new(gpu, &frame.grid, frame.opacity)?;
+    let kernel = Kernel::new(gpu)?;
+    let scene = Scene::new(gpu, &kernel, &frame.grid, frame.opacity)?;
     let smallest = frame.grid.min_spacing();
     let integral = integral(radius_mm, offset_mm, &frame.grid, plan)?;
     let fine = Frame { step_mm: smallest / f64::from(plan.steps_per_voxel), ..*frame };
@@ -257,13 +302,13 @@ const MAX_SAMPLES: u32 = 1 << 16;
 /// An opacity volume on the device, with the rim that the kernel asks for.
 struct Scene<'a> {
     gpu: &'a Gpu,
-    kernel: Kernel,
+    kernel: &'a Kernel,
     field: Field,
     clearance: gpu::Image,
 }
 
 impl<'a> Scene<'a> {
-    fn new(gpu: &'a Gpu, grid: &Grid, opacity: &[f32]) -> Result<Self> {
+    fn new(gpu: &'a Gpu, kernel: &'a Kernel, grid: &Grid, opacity: &[f32]) -> Result<Self> {
         if opacity.len() != grid.len() || !opacity.iter().all(|a| (0.0..=1.0).contains(a)) {
             return Err(Error::Config {
                 what: "opacity of a reference".into(),
@@ -285,7 +330,7 @@ impl<'a> Scene<'a> {
         let Values::F32(values) = &volume.values else { unreachable!("made above") };
         let field = Field::upload(gpu, &volume)?;
         let clearance = upload_clearance(gpu, &field, values)?;
-        Ok(Self { gpu, kernel: Kernel::new(gpu)?, field, clearance })
+        Ok(Self { gpu, kernel, field, clearance })
     }
 
     /// Ambient value at each position (index coordinates inside the volume) and the device's time in ms.

@@ -3,4 +3,6 @@
 pub mod cao;
 pub mod lao;
 pub mod parts;
+pub mod sweep;
+pub mod trial;
 pub mod volumes;

@@ -23,7 +23,7 @@ pub struct Volumes {
     pub ambient: Image,
     /// What the clips do to each brick, u32 each.
     pub clip_bricks: Buffer,
-    /// Bricks that the ray cast cannot skip, u32 each.
+    /// Bricks with opacity before clipping, u32 each.
     pub occupancy: Buffer,
     /// Bricks that the last contextual update changed, u32 each.
     pub changed_before: Buffer,
@@ -64,6 +64,39 @@ impl Volumes {
 pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Result<Image> {
     let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
     gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
+}
+
+/// Texels of a volume, x fastest; slices at a time, a sixteenth of it, so that reading takes little memory. Uses the device's queue and
+/// waits for it.
+pub fn read_texels(gpu: &Gpu, image: &Image) -> Result<Vec<u8>> {
+    let [x, y, z] = image.desc().dims;
+    let slice = u64::from(x) * u64::from(y) * image.desc().format.bytes();
+    let slices = ((64 << 20) / slice).clamp(1, u64::from(z.div_ceil(16))) as u32;
+    let read_back = gpu.buffer("volume read-back", slice * u64::from(slices), BufferUse::Readback)?;
+    let mut all = Vec::with_capacity((slice * u64::from(z)) as usize);
+    let mut first = 0;
+    while first < z {
+        let count = slices.min(z - first);
+        let mut rec = gpu.recorder("read volume")?;
+        rec.copy_image_to_buffer(image, 0, [0, 0, first], [x, y, count], &read_back, 0)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        all.extend(read_back.read(0, slice * u64::from(count))?);
+        first += count;
+    }
+    Ok(all)
+}
+
+/// What the texels of an r32float or r16unorm volume stand for, x fastest. Uses the device's queue and waits for it.
+pub fn read_values(gpu: &Gpu, image: &Image) -> Result<Vec<f32>> {
+    let texels = read_texels(gpu, image)?;
+    Ok(match image.desc().format {
+        Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&texels)
+            .into_iter()
+            .map(|texel| f32::from(texel) / 65535.0)
+            .collect(),
+        _ => bytemuck::pod_collect_to_vec(&texels),
+    })
 }
 
 /// The kernels that methods share.

@@ -5,7 +5,7 @@
 //! two reads a voxel.
 
 use super::field::Field;
-use super::row_of_groups;
+use super::{device_buffer, row_of_groups};
 use crate::Result;
 use crate::gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, shaders};
 use crate::layout_check;
@@ -47,6 +47,26 @@ impl BrickList {
         let bytes = 16 + 4 * u64::from(field.brick_count());
         Ok(Self { buffer: gpu.buffer("brick list", bytes, BufferUse::Device)? })
     }
+
+    /// A list of these bricks. Uses the device's queue and waits for it.
+    pub fn of(gpu: &Gpu, bricks: &[u32]) -> Result<Self> {
+        let count = bricks.len() as u32;
+        let [x, y, _] = row_of_groups(count);
+        let mut content = vec![x, y, 1, count];
+        content.extend(bricks);
+        Ok(Self { buffer: device_buffer(gpu, "brick list", bytemuck::cast_slice(&content))? })
+    }
+
+    /// Empties the list, for a kernel that fills it.
+    pub fn record_clear(&self, rec: &mut Recorder) -> Result<()> {
+        rec.barrier(
+            &[Access::IndirectRead, Access::StorageRead],
+            &[Access::TransferWrite, Access::StorageWrite],
+        );
+        rec.update(&self.buffer, 0, bytemuck::bytes_of(&[0_u32, 0, 1, 0]))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+        Ok(())
+    }
 }
 
 /// The kernel `bricks`.
@@ -73,12 +93,7 @@ impl Bricks {
         changed_before: &Buffer,
         list: &BrickList,
     ) -> Result<()> {
-        rec.barrier(
-            &[Access::IndirectRead, Access::StorageRead],
-            &[Access::TransferWrite, Access::StorageWrite],
-        );
-        rec.update(&list.buffer, 0, bytemuck::bytes_of(&[0_u32, 0, 1, 0]))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+        list.record_clear(rec)?;
         let params = Params { dims: field.dims, mode: which as u32, bricks: field.bricks(), pad: 0 };
         let binds = [
             ("opacity", Bind::Image(opacity)),

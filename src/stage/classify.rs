@@ -40,7 +40,8 @@ pub enum AntiAliasing {
 /// The kernel `classify`.
 pub struct Classify {
     pipeline: Pipeline,
-    positions: Buffer,
+    /// The N extra positions of eq. (5), a uniform buffer.
+    pub positions: Buffer,
     /// Voxels of category a, b, c after the last classification: three u32.
     pub count: Buffer,
 }

@@ -1,12 +1,14 @@
 //! Bitwise comparison of two ambient volumes on every voxel that has a value (CAO §4: "exactly the same").
 //!
-//! In: `expected`, `actual` (3D r32float), `mask`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
+//! In: `expected`, `actual` (3D r32float or r16unorm), `mask` or `todo`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
 
 use super::bricks::BrickList;
 use super::field::Field;
 use super::lao::Scope;
 use crate::Result;
-use crate::gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, shaders};
+use crate::gpu::{
+    Access, Bind, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline, shaders,
+};
 use crate::layout_check;
 use bytemuck::{Pod, Zeroable};
 
@@ -16,9 +18,9 @@ struct Params {
     dims: [u32; 3],
     only_needed: u32,
     bricks: [u32; 3],
-    pad: u32,
+    by_brick: u32,
 }
-layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed, bricks });
+layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed, bricks, by_brick });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -35,12 +37,21 @@ layout_check!(Counters => shaders::compare::DIFFERENCE { compared, different, la
 pub struct Difference {
     /// Voxels that have a value.
     pub compared: u64,
-    /// Of these, voxels whose 32 bits are not the same, or that are not within 0 … 1.
+    /// Of these, voxels whose bits are not the same, or that are not within 0 … 1.
     pub different: u64,
     /// Largest |expected − actual| among those.
     pub largest: f32,
     /// Of the compared, voxels that the contextual update recomputed.
     pub recomputed: u64,
+}
+
+/// How it is known which voxels were recomputed.
+#[derive(Clone, Copy)]
+pub enum Recomputed<'a> {
+    /// V_m; clipped voxels that touch no visible one have no value.
+    Mask(&'a Image),
+    /// A u32 a brick, 1 where it was.
+    Bricks(&'a Buffer),
 }
 
 /// The kernel `compare`.
@@ -63,7 +74,7 @@ impl Compare {
         scope: Scope,
         list: &BrickList,
         opacity: &Image,
-        mask: &Image,
+        recomputed: Recomputed,
         expected: &Image,
         actual: &Image,
     ) -> Result<Difference> {
@@ -77,7 +88,23 @@ impl Compare {
             dims: field.dims,
             only_needed: u32::from(scope == Scope::Needed),
             bricks: field.bricks(),
-            pad: 0,
+            by_brick: u32::from(matches!(recomputed, Recomputed::Bricks(_))),
+        };
+        // What is not read still has to be bound.
+        let no_mask = gpu.image(
+            "no mask",
+            &ImageDesc {
+                dims: [1; 3],
+                layers: 1,
+                format: Format::R8Uint,
+                kind: ImageKind::D3,
+                usage: ImageUse::SAMPLED,
+            },
+        )?;
+        rec.discard(&no_mask);
+        let (mask, todo) = match recomputed {
+            Recomputed::Mask(mask) => (mask, &list.buffer),
+            Recomputed::Bricks(todo) => (&no_mask, todo),
         };
         let binds = [
             ("opacity", Bind::Image(opacity)),
@@ -86,6 +113,7 @@ impl Compare {
             ("actual", Bind::Image(actual)),
             ("list", Bind::Buffer(&list.buffer)),
             ("difference", Bind::Buffer(&difference)),
+            ("todo", Bind::Buffer(todo)),
         ];
         rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), &list.buffer, 0)?;
         rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);

@@ -29,7 +29,7 @@ struct Frame {
     light: [f32; 4],
     ambient: f32,
     diffuse: f32,
-    opaque: f32,
+    remainder: f32,
     bias: f32,
     scale: f32,
     occluded: f32,
@@ -37,7 +37,7 @@ struct Frame {
     gain: f32,
 }
 layout_check!(Frame => shaders::raycast::FRAME {
-    eye, dims, spacing, light, ambient, diffuse, opaque, bias, scale, occluded, jitter, gain
+    eye, dims, spacing, light, ambient, diffuse, remainder, bias, scale, occluded, jitter, gain
 });
 
 /// How samples are lit and where they lie.
@@ -52,8 +52,9 @@ pub struct Look {
     /// Distance between samples along a ray in mm; `None` is a quarter of the smallest spacing: at half of it,
     /// steep transfer functions show wood-grain.
     pub step_mm: Option<f32>,
-    /// Opacity at which a ray ends.
-    pub opaque: f32,
+    /// A ray ends where what remains of it cannot change an 8-bit sRGB pixel, over any background, by more than this many
+    /// levels of 255; 0: only where nothing remains.
+    pub tolerance: f32,
     /// The ambient factor is shown times this. A flat wall's is 1/2, so that 2 shows it at full light; the paper's authors do
     /// the same.
     pub gain: f32,
@@ -70,7 +71,7 @@ impl Default for Look {
             diffuse: 0.6,
             light: Vec3::new(-0.4, -0.7, 0.6),
             step_mm: None,
-            opaque: 0.99,
+            tolerance: 0.5,
             gain: 2.0,
             jitter: true,
             occluded: true,
@@ -83,7 +84,7 @@ const MAX_SAMPLES: f32 = 1e5;
 
 /// The distance between samples in mm, refused where a ray along the volume's diagonal would take too many.
 fn checked_step(field: &Field, look: &Look) -> Result<f32> {
-    let step = look.step_mm.unwrap_or(0.25 * field.min_spacing());
+    let step = look.step(field.min_spacing());
     let size = Vec3::from_array(std::array::from_fn(|i| field.dims[i] as f32 * field.spacing[i]));
     let samples = size.length() / step;
     if samples <= MAX_SAMPLES {
@@ -112,19 +113,29 @@ pub fn check_count(views: usize) -> Result<()> {
 }
 
 impl Look {
+    /// What may remain of a ray's light, times the slope of sRGB coding: the tolerance over the brightest light there is, a
+    /// white background's or that of a white sample, unoccluded and facing the light.
+    fn remainder(&self) -> f32 {
+        let brightest = (self.ambient + self.diffuse) * if self.occluded { self.gain } else { 1.0 };
+        self.tolerance / 255.0 / brightest.max(1.0)
+    }
+
+    /// The distance between samples in mm, for a volume whose smallest spacing is `min_spacing` mm.
+    pub fn step(&self, min_spacing: f32) -> f32 {
+        self.step_mm.unwrap_or(0.25 * min_spacing)
+    }
+
     fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
         for (what, value) in [
             ("shading.ambient", self.ambient),
             ("shading.diffuse", self.diffuse),
             ("shading.gain", self.gain),
+            ("shading.tolerance", self.tolerance),
         ] {
             if !(value.is_finite() && value >= 0.0) {
                 return refuse(what, format!("{value}; expected a number >= 0"));
             }
-        }
-        if !(self.opaque > 0.0 && self.opaque <= 1.0) {
-            return refuse("shading.opaque", format!("{}; expected 0 < opacity <= 1", self.opaque));
         }
         if self.light.try_normalize().is_none() {
             return refuse("shading.light", format!("{}; expected a direction", self.light));
@@ -183,7 +194,7 @@ impl FrameBuffer {
         data.light = look.light.normalize().extend(reference_mm).to_array();
         data.ambient = look.ambient;
         data.diffuse = look.diffuse;
-        data.opaque = look.opaque;
+        data.remainder = look.remainder();
         data.bias = field.bias;
         data.scale = field.scale;
         data.occluded = f32::from(u8::from(look.occluded));

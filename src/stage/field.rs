@@ -4,9 +4,9 @@
 //! stored value exactly; the file's slope and intercept go into `scale` and `bias`. 32- and 64-bit values are rounded to
 //! f32, the one loss there is. Devices need not filter 16-bit UNORM texels; where one cannot, 16-bit values become f32 texels.
 
-use crate::Result;
 use crate::gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use crate::volume::{Values, Volume};
+use crate::{Error, Result};
 
 /// Edge of a brick in voxels, as the kernels have it.
 pub const BRICK: u32 = 8;
@@ -30,43 +30,37 @@ pub struct Field {
 impl Field {
     /// Copies a volume to the device through a staging buffer. Uses the device's queue and waits for it.
     pub fn upload(gpu: &Gpu, volume: &Volume) -> Result<Self> {
-        let (format, scale, bias) = texel_format(&volume.values, gpu.filters(Format::R16Unorm));
-        // Slope and intercept of other types are applied in f64 below, before the one rounding to f32.
-        let rescaled = format == Format::R32Float;
-        let (slope, intercept) = if rescaled { (1.0, 0.0) } else { (volume.slope, volume.intercept) };
+        let (format, scale, bias, levels) = coding(gpu, volume);
         let dims = volume.dims.map(|d| d as u32);
         let image = gpu.image(
             "volume",
             &ImageDesc { dims, layers: 1, format, kind: ImageKind::D3, usage: ImageUse::SAMPLED },
         )?;
 
-        // Whole slices at a time, at most 64 MiB of staging.
-        let slice = (dims[0] * dims[1]) as usize;
-        let slice_bytes = slice as u64 * format.bytes();
-        let slices = ((64 << 20) / slice_bytes.max(1)).clamp(1, u64::from(dims[2])) as u32;
-        let staging = gpu.buffer("volume staging", slice_bytes * u64::from(slices), BufferUse::Upload)?;
-        let mut first = 0;
-        while first < dims[2] {
-            let count = slices.min(dims[2] - first);
-            let range = first as usize * slice..(first + count) as usize * slice;
-            staging.write(0, &texels(volume, format, range))?;
-            let mut rec = gpu.recorder("upload")?;
-            if first == 0 {
-                rec.discard(&image);
-                rec.barrier(&[], &[Access::TransferWrite]);
-            }
-            rec.copy_buffer_to_image(&staging, 0, &image, [0, 0, first], [dims[0], dims[1], count])?;
-            rec.submit_and_wait()?;
-            first += count;
+        let mut rec = gpu.recorder("upload")?;
+        rec.discard(&image);
+        rec.submit_and_wait()?;
+        copy(gpu, &image, [0; 3], volume)?;
+        Ok(Self { dims, spacing: volume.spacing.map(|s| s as f32), volume: image, scale, bias, levels })
+    }
+
+    /// Overwrites the box of voxels that begins at `first` by a volume of the same type. Uses the device's queue and waits for
+    /// it.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the box is not inside, or the values are stored or rescaled in another way.
+    pub fn overwrite(&self, gpu: &Gpu, first: [u32; 3], values: &Volume) -> Result<()> {
+        let refuse = |problem: String| Err(Error::Config { what: "new values".into(), problem });
+        let inside = (0..3).all(|i| first[i] as usize + values.dims[i] <= self.dims[i] as usize);
+        if !inside {
+            return refuse(format!("{:?} voxels at {first:?} of {:?}", values.dims, self.dims));
         }
-        Ok(Self {
-            dims,
-            spacing: volume.spacing.map(|s| s as f32),
-            volume: image,
-            scale: (scale * slope) as f32,
-            bias: (bias * slope + intercept) as f32,
-            levels: scale as f32,
-        })
+        let own = (self.volume.desc().format, self.scale, self.bias, self.levels);
+        let given = coding(gpu, values);
+        if given != own {
+            return refuse(format!("stored as {given:?} (format, scale, bias, levels); expected {own:?}"));
+        }
+        copy(gpu, &self.volume, first, values)
     }
 
     /// Bricks along x, y, z.
@@ -88,6 +82,38 @@ impl Field {
     pub fn diagonal(&self) -> f32 {
         glam::Vec3::from_array(self.spacing).length()
     }
+}
+
+/// Format of the texels that hold a volume, and `scale`, `bias` and `levels` of its [`Field`].
+fn coding(gpu: &Gpu, volume: &Volume) -> (Format, f32, f32, f32) {
+    let (format, scale, bias) = texel_format(&volume.values, gpu.filters(Format::R16Unorm));
+    // Slope and intercept of other types are applied in f64 by `texels`, before the one rounding to f32.
+    let rescaled = format == Format::R32Float;
+    let (slope, intercept) = if rescaled { (1.0, 0.0) } else { (volume.slope, volume.intercept) };
+    (format, (scale * slope) as f32, (bias * slope + intercept) as f32, scale as f32)
+}
+
+/// Writes a volume's texels into the box of an image that begins at `first`, whole slices at a time, at most 64 MiB of
+/// staging.
+fn copy(gpu: &Gpu, image: &Image, [x, y, z]: [u32; 3], volume: &Volume) -> Result<()> {
+    let format = image.desc().format;
+    let dims = volume.dims.map(|d| d as u32);
+    let slice = (dims[0] * dims[1]) as usize;
+    let slice_bytes = slice as u64 * format.bytes();
+    let slices = ((64 << 20) / slice_bytes.max(1)).clamp(1, u64::from(dims[2])) as u32;
+    let staging = gpu.buffer("volume staging", slice_bytes * u64::from(slices), BufferUse::Upload)?;
+    let mut first = 0;
+    while first < dims[2] {
+        let count = slices.min(dims[2] - first);
+        let range = first as usize * slice..(first + count) as usize * slice;
+        staging.write(0, &texels(volume, format, range))?;
+        let mut rec = gpu.recorder("upload")?;
+        rec.barrier(&[Access::SampledRead, Access::GraphicsRead], &[Access::TransferWrite]);
+        rec.copy_buffer_to_image(&staging, 0, image, [x, y, z + first], [dims[0], dims[1], count])?;
+        rec.submit_and_wait()?;
+        first += count;
+    }
+    Ok(())
 }
 
 /// Format, scale and bias of the texels that hold these values, with and without a device that filters `R16Unorm`.

@@ -1,7 +1,9 @@
 //! The host side of each kernel: parameters, bindings, `record`. One file a kernel, named after it; each opens with the
 //! equation and its source, what goes in and out, and what it costs.
 
+pub mod brick_distance;
 pub mod bricks;
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
@@ -11,12 +13,15 @@ pub mod dilate;
 pub mod eyes;
 pub mod field;
 pub mod lao;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod peel;
 pub mod raycast;
 pub mod reference;
 pub mod ssao;
+pub mod sweep;
+pub mod sweep_list;
 pub mod transfer;
 
 use crate::Result;

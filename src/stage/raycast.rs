@@ -1,7 +1,7 @@
 //! Stage 6 of CAO §3.5: all views by ray casting, in one multiview pass into an image of a layer each.
 //!
 //! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i c_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, `L = A(x)·(k_a + k_d |n·l|)`. In: `volume`, `transfer`,
-//! `opacity` V_o (gradients), `ambient` V_AO, `occupancy`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
+//! `opacity` V_o (gradients), `ambient` V_AO, `distances`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
 //! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
 
 use super::clips::ClipSet;
@@ -36,8 +36,8 @@ pub struct Bindings<'a> {
     pub opacity: &'a Image,
     /// V_AO.
     pub ambient: &'a Image,
-    /// Bricks that can show something.
-    pub occupancy: &'a Buffer,
+    /// How far rays may leap.
+    pub distances: &'a Buffer,
     /// The clips.
     pub clips: &'a ClipSet,
     /// The frame.
@@ -113,7 +113,7 @@ impl Raycast {
             ("field", Bind::Sampler(&self.field)),
             ("edge", Bind::Sampler(&self.edge)),
             ("frame", Bind::Buffer(&b.frame.buffer)),
-            ("occupancy", Bind::Buffer(b.occupancy)),
+            ("distances", Bind::Buffer(b.distances)),
             ("clips", Bind::Buffer(&b.clips.clips)),
             ("layers", Bind::Buffer(&b.clips.layers)),
         ];

@@ -66,6 +66,7 @@ Examples:
       --clip sphere --clip-scale 40 --clip-translate 38,-38,38
   cao render head.nrrd --transfer ct-bone -o stereo.png \\
       --clip box --clip-mode keep --clip-scale 60,80,90
+  cao render head.nrrd --transfer ct-bone --budget-ms 20 -o stereo.png
   cao render head.nrrd --eyes left.png,right.png \\
       --clip tool.obj --clip plane --clip-rotate 0,90,0";
 
@@ -74,6 +75,7 @@ Examples:
   cao occlusion head.nrrd --transfer ct-bone -o ao.nrrd
   cao occlusion ct.raw --dims 512,512,110 --type int16 --spacing 0.7,0.7,1.5 \\
       --rays 50w --quadrature segment -o ao.nrrd
+  cao occlusion head.nrrd --transfer ct-bone --budget-error 0.01 -o ao.nrrd
   cao occlusion builtin:engine:64 --method cao --clip torus --clip-scale 20 \\
       -o ao.nrrd --mask-out vm.nrrd";
 
@@ -126,6 +128,26 @@ pub struct Clips {
     pub clip_scale: Vec<[f32; 3]>,
 }
 
+/// Settings chosen by what they cost in the scene at hand.
+#[derive(Args)]
+#[command(next_help_heading = "Occlusion")]
+pub struct Budget {
+    /// Choose the cheapest settings whose error stays below E (root mean square, 0 to 1, against converged occlusion), measured on samples
+    /// of this scene; --method, --rays and --quadrature limit the choice
+    #[arg(long, value_name = "E", value_parser = budget, conflicts_with = "budget_ms")]
+    pub budget_error: Option<f64>,
+    /// Choose the most accurate settings that compute all occlusion in T ms on this device
+    #[arg(long, value_name = "T", value_parser = budget)]
+    pub budget_ms: Option<f64>,
+}
+
+fn budget(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|b: &f64| b.is_finite() && *b > 0.0)
+        .ok_or_else(|| "expected a number > 0".into())
+}
+
 #[derive(Args)]
 pub struct Render {
     /// Scene file (.toml), volume file, or builtin:NAME:SIZE
@@ -152,11 +174,14 @@ pub struct Render {
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
     /// Draw without ambient occlusion
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["budget_error", "budget_ms"])]
     pub solid: bool,
     #[command(flatten)]
     pub settings: Settings,
-    /// cao computes only what the clips change; lao everything, for comparison [default: cao]
+    #[command(flatten)]
+    pub budget: Budget,
+    /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
+    /// comparison [default: cao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
     pub method: Option<Method>,
     #[command(flatten)]
@@ -180,7 +205,10 @@ pub struct Occlusion {
     pub mask_out: Option<PathBuf>,
     #[command(flatten)]
     pub settings: Settings,
-    /// lao computes everything; cao first without clips, then only what the clips change [default: lao]
+    #[command(flatten)]
+    pub budget: Budget,
+    /// lao: every ray of every voxel; cao: first without clips, then only what the clips change; sweep: whole lines of voxels at once,
+    /// many times faster [default: lao]
     #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
     pub method: Option<Method>,
     /// Compute only voxels that a sample with opacity can touch; the others hold 1

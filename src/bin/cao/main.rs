@@ -1,6 +1,7 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
 mod args;
+mod budget;
 mod chart;
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,6 +1,7 @@
 //! `cao occlusion`: the ambient volume of a volume, as a file.
 
 use crate::args::{self, Global, Occlusion, setup};
+use crate::budget;
 use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
@@ -30,6 +31,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&clips)?;
+    let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let timings = renderer.update(&mut |done| progress.set(done))?;
     check_validation(&gpu)?;
@@ -49,7 +51,10 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
-    out.setup(&setup, &volume);
+    out.setup(renderer.setup(), &volume);
+    if let Some(planned) = &planned {
+        planned.print(&mut out);
+    }
     out.categories(&categories);
     out.timings(&timings);
     out.memory(&gpu, &volume);

@@ -1,6 +1,7 @@
 //! `cao render`: a picture for both eyes.
 
 use crate::args::{self, Global, Render, usage};
+use crate::budget;
 use crate::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use anyhow::Result;
 use cao::picture::Picture;
@@ -64,6 +65,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&scene.clips)?;
+    let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
     progress.stage("drawing");
@@ -77,7 +79,10 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
-    out.setup(&setup, &volume);
+    out.setup(renderer.setup(), &volume);
+    if let Some(planned) = &planned {
+        planned.print(&mut out);
+    }
     out.image(size);
     out.timings(&timings);
     out.memory(&gpu, &volume);
@@ -93,8 +98,10 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     let s = &args.settings;
     let o = &mut scene.occlusion;
     o.rays = s.rays.unwrap_or(o.rays);
+    if let Some(method) = args.method.filter(|method| *method != o.method) {
+        (o.method, o.quadrature) = (method, method.quadrature());
+    }
     o.quadrature = s.quadrature.unwrap_or(o.quadrature);
-    o.method = args.method.unwrap_or(o.method);
     o.radius_mm = s.radius_mm.or(o.radius_mm);
     o.offset_mm = s.offset_mm.or(o.offset_mm);
     o.step_mm = s.step_mm.or(o.step_mm);

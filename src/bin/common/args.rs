@@ -65,7 +65,7 @@ pub struct Settings {
     /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26]
     #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
     pub rays: Option<RaySet>,
-    /// Rule along a ray: left (the paper's sum), cell, segment [default: left]
+    /// Rule along a ray: left (the paper's sum), cell, segment [default: left; of sweeps segment, their only one]
     #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
     pub quadrature: Option<Quadrature>,
     /// Length of the rays in mm [default: 20 times the smallest spacing]
@@ -74,7 +74,7 @@ pub struct Settings {
     /// Distance from the voxel's centre in mm at which they start [default: half a step]
     #[arg(long, value_name = "O", value_parser = length, allow_hyphen_values = true)]
     pub offset_mm: Option<f32>,
-    /// Distance in mm between their samples [default: the smallest spacing]
+    /// Distance in mm between their samples, of sweeps at most [default: the smallest spacing; of sweeps 1.75 times that]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
 }
@@ -126,7 +126,7 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     setup.scope = if all { Scope::All } else { Scope::Needed };
     let occlusion = &mut setup.occlusion;
     occlusion.rays = settings.rays.unwrap_or(occlusion.rays);
-    occlusion.quadrature = settings.quadrature.unwrap_or(occlusion.quadrature);
+    occlusion.quadrature = settings.quadrature.unwrap_or(method.quadrature());
     occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
     occlusion.offset_mm = settings.offset_mm;
     occlusion.step_mm = settings.step_mm;

@@ -3,6 +3,7 @@
 use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
 use cao::gpu::{Gpu, OpenOptions};
+use cao::lattice::LatticeRays;
 use cao::renderer::{Categories, Setup};
 use cao::scene::Method;
 use cao::volume::Volume;
@@ -65,7 +66,7 @@ impl Out {
 
     /// How occlusion was computed.
     pub fn setup(&mut self, setup: &Setup, volume: &Volume) {
-        let method = if setup.method == Method::Cao { "cao" } else { "lao" };
+        let method = setup.method.name();
         self.json(json!({ "method": method }));
         self.occlusion(method, setup, volume);
     }
@@ -74,6 +75,24 @@ impl Out {
     pub fn occlusion(&mut self, methods: &str, setup: &Setup, volume: &Volume) {
         let o = setup.occlusion;
         let spacing = volume.min_spacing();
+        if setup.method == Method::Sweep {
+            let rays = LatticeRays::new(o.rays, volume.spacing);
+            self.line(format!(
+                "method    {methods}, rays {} ({} directions, residual {:.1e}), quadrature segment, radius {} mm, from {} mm on, samples at most {} mm apart",
+                o.rays.name(),
+                rays.rays.len(),
+                rays.residual,
+                o.radius_mm,
+                o.lattice_offset(spacing),
+                o.lattice_step(spacing)
+            ));
+            self.json(json!({
+                "rays": o.rays.name(), "directions": rays.rays.len(), "residual": rays.residual,
+                "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
+                "offset_mm": o.lattice_offset(spacing), "step_mm": o.lattice_step(spacing)
+            }));
+            return;
+        }
         self.line(format!(
             "method    {methods}, rays {}, quadrature {}, radius {} mm in {} steps of {} mm, first sample at {} mm",
             o.rays.name(),

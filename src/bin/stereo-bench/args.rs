@@ -14,7 +14,7 @@ pub struct Cli {
     #[arg(default_value = "builtin:engine:128")]
     pub input: String,
     /// Methods, which take turns frame by frame. solid: no occlusion; lao: computed anew in every frame; cao: what the clip changed;
-    /// cao-literal: the paper's recipe to the letter
+    /// cao-literal: the paper's recipe to the letter; sweep: line sweeps by the rule `segment`, what the clip changed
     #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Method::parse, default_values_t = Method::ALL)]
     pub methods: Vec<Method>,
     /// Pixels of one view
@@ -48,6 +48,13 @@ pub struct Cli {
     /// [default of FOLDER: benches/runs]
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "benches/runs")]
     pub save: Option<PathBuf>,
+    /// Measure what the project holds itself to and exit with 1 where a bar is missed; every other setting is the bar's own
+    #[arg(long)]
+    pub bars: bool,
+    /// Folder with volumes/engine_256x256x128_uint8.nrrd and volumes/torso_s0024_287x287x486_uint8.nrrd, for the bars on real
+    /// volumes
+    #[arg(long, value_name = "DIR", requires = "bars")]
+    pub data: Option<PathBuf>,
     #[command(flatten)]
     pub settings: Settings,
     #[command(flatten)]
@@ -64,6 +71,7 @@ Examples:
   stereo-bench builtin:skeleton:512 --radius-mm 50 --rays 54 --size 2064x2208
   stereo-bench --methods lao,cao --scale rays,radius,views --csv frames.csv
   stereo-bench --scale size,rays,radius,resolution,views --save
+  stereo-bench --bars --data DIR               minutes on a software driver
 
 The path: in 90 frames the head goes once round an ellipse of 20 degrees of
 azimuth and 8 of elevation about a place from which the volume fills the

@@ -1,28 +1,28 @@
 //! Every frame as a line of comma-separated values.
 
-use super::frames::{Configuration, Measured};
+use super::suite::Outcome;
 use std::fmt::Write;
 
 /// Columns. Times in ms, lengths in mm.
-const HEADER: &str = "volume,x,y,z,rays,quadrature,radius_mm,width,height,views,method,run,frame,frame_ms,clipping_ms,\
+const HEADER: &str = "series,volume,x,y,z,rays,radius_mm,width,height,views,method,quadrature,run,frame,frame_ms,clipping_ms,\
     spherical_ray_cast_ms,rendering_ms,overhead_ms,voxels_clipped,voxels_affected,voxels_untouched";
 
-/// All frames of all configurations; runs count from 1, frames from 0.
-pub fn table(results: &[(Configuration, Vec<Measured>)]) -> String {
+/// All frames of all results; runs count from 1, frames from 0.
+pub fn table(results: &[Outcome]) -> String {
     let mut text = format!("{HEADER}\n");
-    for (c, measured) in results {
+    for Outcome { series, configuration: c, measured, .. } in results {
         let ([x, y, z], o) = (c.input.volume.dims, c.setup.occlusion);
         let setting = format!(
-            "{},{x},{y},{z},{},{},{},{},{},{}",
+            "{series},{},{x},{y},{z},{},{},{},{},{}",
             quoted(&c.input.name),
             o.rays.name(),
-            o.quadrature.name(),
             o.radius_mm,
             c.size[0],
             c.size[1],
             c.views
         );
         for m in measured {
+            let quadrature = m.method.setup(c.setup).occlusion.quadrature.name();
             for (run, frames) in m.runs.iter().enumerate() {
                 for (n, frame) in frames.iter().enumerate() {
                     let [clipping, rays, rendering, overhead] = frame.parts();
@@ -30,7 +30,7 @@ pub fn table(results: &[(Configuration, Vec<Measured>)]) -> String {
                     // Writing to a string cannot fail.
                     let _ = writeln!(
                         text,
-                        "{setting},{},{},{n},{:.4},{clipping:.4},{rays:.4},{rendering:.4},{overhead:.4},{},{},{}",
+                        "{setting},{},{quadrature},{},{n},{:.4},{clipping:.4},{rays:.4},{rendering:.4},{overhead:.4},{},{},{}",
                         m.method,
                         run + 1,
                         frame.wall,

@@ -1,4 +1,4 @@
-//! The frames of one configuration: every method in turn, along the path, timed.
+//! The frames of some configurations: every method of each in turn, along the path, timed.
 
 use super::method::Method;
 use super::path;
@@ -30,13 +30,6 @@ pub struct Configuration {
     pub views: usize,
 }
 
-impl PartialEq for Configuration {
-    fn eq(&self, other: &Self) -> bool {
-        let key = |c: &Self| (c.input.name.clone(), c.setup, c.size, c.views);
-        key(self) == key(other)
-    }
-}
-
 /// What is done in every configuration.
 pub struct Plan {
     pub methods: Vec<Method>,
@@ -48,7 +41,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Frames that all methods draw together, counted or not.
+    /// Frames that all methods draw together in one configuration, counted or not.
     pub fn total(&self) -> u64 {
         u64::from(self.runs) * u64::from(self.warm_up + self.frames) * self.methods.len() as u64
     }
@@ -68,14 +61,15 @@ pub struct Frame {
 pub const PARTS: [&str; 4] = ["clipping", "spherical ray cast", "rendering", "overhead"];
 
 impl Frame {
-    /// Times of the [`PARTS`] in ms. What is neither classification nor drawing brings the ambient volume up to date; what no stage
+    /// Times of the [`PARTS`] in ms. What is neither clipping nor for the drawing brings the ambient volume up to date; what no stage
     /// accounts for is overhead: recording, submission, waiting.
     pub fn parts(&self) -> [f64; 4] {
         let mut parts = [0.0; 4];
         for (stage, ms) in &self.stages {
             parts[match stage.as_str() {
-                "classify" => 0,
-                "raycast" => 2,
+                "classify" | "carve" => 0,
+                // Which bricks rays leap over changes with the clips too.
+                "occupancy" | "distances" | "raycast" => 2,
                 _ => 1,
             }] += ms;
         }
@@ -98,13 +92,15 @@ impl Measured {
     }
 }
 
-/// A method's renderer.
-struct Subject {
+/// A method's renderer in one configuration.
+struct Subject<'a> {
+    configuration: &'a Configuration,
+    target: Rc<Target>,
     renderer: Renderer,
     measured: Measured,
 }
 
-/// The images that all methods draw to.
+/// The images that all methods of a configuration draw to.
 struct Target {
     colour: Image,
     depth: Image,
@@ -129,25 +125,30 @@ impl Target {
     }
 }
 
-/// Draws the path with all methods in turn. `progress` hears of every frame drawn.
+/// Draws the path with all methods of all configurations in turn, frame by frame, so that all can be compared with one another.
+/// `progress` hears of every frame drawn. The results are in the order of the configurations, and within each in that of the methods.
 pub fn measure(
     gpu: &Gpu,
-    configuration: &Configuration,
+    configurations: &[Configuration],
     plan: &Plan,
     progress: &mut dyn FnMut(),
-) -> Result<Vec<Measured>> {
-    let Configuration { size: [width, height], views, .. } = configuration;
-    let target = Target::new(gpu, configuration)
-        .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
+) -> Result<Vec<Vec<Measured>>> {
     let mut subjects = Vec::new();
-    for &method in &plan.methods {
-        subjects.push(subject(gpu, configuration, plan, method).with_context(|| method.name())?);
+    for configuration in configurations {
+        let Configuration { size: [width, height], views, .. } = configuration;
+        let target = Target::new(gpu, configuration)
+            .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
+        let target = Rc::new(target);
+        for &method in &plan.methods {
+            let subject = Subject::new(gpu, configuration, &target, plan, method);
+            subjects.push(subject.with_context(|| method.name())?);
+        }
     }
     for _ in 0..plan.runs {
         subjects.iter_mut().for_each(|subject| subject.measured.runs.push(Vec::new()));
         for frame in -i64::from(plan.warm_up)..i64::from(plan.frames) {
             for subject in &mut subjects {
-                let drawn = draw(gpu, configuration, plan, subject, &target, frame)?;
+                let drawn = subject.draw(gpu, plan, frame)?;
                 if let (0.., Some(run)) = (frame, subject.measured.runs.last_mut()) {
                     run.push(drawn);
                 }
@@ -155,49 +156,53 @@ pub fn measure(
             }
         }
     }
-    Ok(subjects.into_iter().map(|subject| subject.measured).collect())
+    let mut measured = subjects.into_iter().map(|subject| subject.measured);
+    Ok(configurations.iter().map(|_| measured.by_ref().take(plan.methods.len()).collect()).collect())
 }
 
-/// A renderer with all that does not change from frame to frame.
-fn subject(gpu: &Gpu, configuration: &Configuration, plan: &Plan, method: Method) -> Result<Subject> {
-    let input = &configuration.input;
-    let setup = method.setup(configuration.setup);
-    let mut renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
-    move_clip(&mut renderer, configuration, plan, -1 - i64::from(plan.warm_up))?;
-    renderer.update(&mut |_| ())?;
-    Ok(Subject { renderer, measured: Measured { method, runs: Vec::new() } })
-}
+impl<'a> Subject<'a> {
+    /// A renderer with all that does not change from frame to frame.
+    fn new(
+        gpu: &Gpu,
+        configuration: &'a Configuration,
+        target: &Rc<Target>,
+        plan: &Plan,
+        method: Method,
+    ) -> Result<Self> {
+        let input = &configuration.input;
+        let setup = method.setup(configuration.setup);
+        let renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
+        let measured = Measured { method, runs: Vec::new() };
+        let mut subject = Self { configuration, target: target.clone(), renderer, measured };
+        subject.move_clip(plan, -1 - i64::from(plan.warm_up))?;
+        subject.renderer.update(&mut |_| ())?;
+        Ok(subject)
+    }
 
-fn move_clip(renderer: &mut Renderer, configuration: &Configuration, plan: &Plan, frame: i64) -> Result<()> {
-    let size_mm = configuration.input.volume.size_mm();
-    let clips: Vec<_> = plan.clip.iter().map(|shape| path::clip(shape, size_mm, frame)).collect();
-    Ok(renderer.set_clips(&clips)?)
-}
+    fn move_clip(&mut self, plan: &Plan, frame: i64) -> Result<()> {
+        let size_mm = self.configuration.input.volume.size_mm();
+        let clips: Vec<_> = plan.clip.iter().map(|shape| path::clip(shape, size_mm, frame)).collect();
+        Ok(self.renderer.set_clips(&clips)?)
+    }
 
-/// One frame, as a host draws it.
-fn draw(
-    gpu: &Gpu,
-    configuration: &Configuration,
-    plan: &Plan,
-    subject: &mut Subject,
-    target: &Target,
-    frame: i64,
-) -> Result<Frame> {
-    let Configuration { input, size, views, .. } = configuration;
-    let aspect = size[0] as f32 / size[1] as f32;
-    let views = path::views(input.volume.size_mm(), aspect, *views, frame)?;
-    let look = subject.measured.method.look();
-    let renderer = &mut subject.renderer;
+    /// One frame, as a host draws it.
+    fn draw(&mut self, gpu: &Gpu, plan: &Plan, frame: i64) -> Result<Frame> {
+        let Configuration { input, size, views, .. } = self.configuration;
+        let aspect = size[0] as f32 / size[1] as f32;
+        let views = path::views(input.volume.size_mm(), aspect, *views, frame)?;
+        let look = self.measured.method.look();
 
-    let start = Instant::now();
-    move_clip(renderer, configuration, plan, frame)?;
-    let mut rec = gpu.recorder("frame")?;
-    renderer.record_update(&mut rec)?;
-    renderer.record_draw(&mut rec, &views, &look, &target.colour, &target.depth, *size)?;
-    let stages = rec.submit_and_wait()?;
-    let wall = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        self.move_clip(plan, frame)?;
+        let mut rec = gpu.recorder("frame")?;
+        self.renderer.record_update(&mut rec)?;
+        let Target { colour, depth } = &*self.target;
+        self.renderer.record_draw(&mut rec, &views, &look, colour, depth, *size)?;
+        let stages = rec.submit_and_wait()?;
+        let wall = start.elapsed().as_secs_f64() * 1e3;
 
-    Ok(Frame { wall, stages, categories: renderer.categories()? })
+        Ok(Frame { wall, stages, categories: self.renderer.categories()? })
+    }
 }
 
 #[cfg(test)]
@@ -206,7 +211,8 @@ mod tests {
 
     #[test]
     fn every_stage_belongs_to_one_part_and_the_rest_is_overhead() {
-        let stages = [("classify", 1.0), ("bricks", 0.5), ("contextual", 4.0), ("raycast", 2.0)];
+        let stages =
+            [("classify", 1.0), ("bricks", 0.5), ("contextual", 4.0), ("distances", 0.25), ("raycast", 1.75)];
         let stages = stages.map(|(name, ms)| (name.to_owned(), ms)).to_vec();
         let mut frame = Frame { wall: 8.0, stages, categories: Categories::default() };
         assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);

@@ -6,6 +6,7 @@
 //! are GPU timestamps; the time of a frame is wall-clock time.
 
 mod args;
+mod bars;
 #[path = "../common/mod.rs"]
 mod common;
 mod csv;
@@ -24,5 +25,5 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let cli = args::Cli::parse();
-    common::end("stereo-bench", suite::run(&cli))
+    common::end("stereo-bench", if cli.bars { bars::run(&cli) } else { suite::run(&cli) })
 }

@@ -17,11 +17,13 @@ pub enum Method {
     Cao,
     /// The same with the dilation maps of the paper to the letter, which leave voxels stale.
     CaoLiteral,
+    /// Line sweeps, where opacities changed; rays by their own rule.
+    Sweep,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 4] = [Self::Solid, Self::Lao, Self::Cao, Self::CaoLiteral];
+    pub const ALL: [Self; 5] = [Self::Solid, Self::Lao, Self::Cao, Self::CaoLiteral, Self::Sweep];
 
     /// Name on the command line and in tables.
     pub fn name(self) -> &'static str {
@@ -30,6 +32,7 @@ impl Method {
             Self::Lao => "lao",
             Self::Cao => "cao",
             Self::CaoLiteral => "cao-literal",
+            Self::Sweep => "sweep",
         }
     }
 
@@ -51,6 +54,10 @@ impl Method {
                 // The literal recipe has one resolution for both maps.
                 let resolution = shared.maps.resolution;
                 setup.maps = MapSettings { literal: true, cells: resolution, ..shared.maps };
+            }
+            Self::Sweep => {
+                setup.method = scene::Method::Sweep;
+                setup.occlusion.quadrature = scene::Method::Sweep.quadrature();
             }
         }
         setup

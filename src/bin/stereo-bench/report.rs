@@ -2,7 +2,11 @@
 
 use super::frames::{Configuration, Frame, Measured, PARTS, Plan};
 use super::method::Method;
+use super::path;
 use super::statistics::{median, percentile};
+use super::suite::Outcome;
+use anyhow::Result;
+use cao::view::View;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -76,7 +80,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
-        "            affected: share of the voxels whose neighbourhood the clip changed, mean (the paper's Table 2)"
+        "            affected: share of the voxels near what the clip changed, of sweeps in whole bricks, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
@@ -96,42 +100,95 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
     text
 }
 
-/// One series: median frame times, one line a value.
-pub fn series_table<'a>(
-    series: &str,
-    points: impl Iterator<Item = (&'a str, &'a [Measured])>,
-    methods: &[Method],
-) -> String {
-    let heads: String = methods.iter().map(|method| format!("{:>13}", method.name())).collect();
-    let mut text = format!("\n{:<16}{heads}\n", format!("{series}, ms"));
-    for (value, all) in points {
-        let cells: String = all.iter().map(|m| format!("{:>13.2}", median(&walls(m)))).collect();
-        text += &format!("{value:<16}{cells}\n");
-    }
-    text + "                medians of frames; the other settings as above\n"
+/// Median over the frames of a method's time here over its time there: the two took turns.
+fn growth(here: &Measured, there: &Measured) -> f64 {
+    median(&here.frames().zip(there.frames()).map(|(here, there)| here.wall / there.wall).collect::<Vec<_>>())
 }
 
-/// One configuration.
-pub fn as_json(c: &Configuration, all: &[Measured]) -> Value {
-    let o = c.setup.occlusion;
+/// One series: median frame times, one line a value, and how many times those of the first value they are.
+pub fn series_table(points: &[Outcome]) -> String {
+    let Some(first) = points.first() else { return String::new() };
+    let heads: String = first.measured.iter().map(|m| format!("{:>22}", m.method.name())).collect();
+    let mut text = format!("\n{:<14}{heads}\n", format!("{}, ms", first.series));
+    for point in points {
+        let cells = point.measured.iter().zip(&first.measured).map(|(m, first)| {
+            let growth = format!("(x {:.2})", growth(m, first));
+            format!("{:>11.2} {growth:>10}", median(&walls(m)))
+        });
+        text += &format!("{:<14}{}\n", point.value, cells.collect::<String>());
+    }
+    text + "              medians of frames, and of their ratios to the first line's; all take turns\n"
+}
+
+/// What the counted frames show, for whoever draws the same with another program: eyes and clip of each, light, step.
+pub fn path_json(c: &Configuration, plan: &Plan) -> Result<Value> {
+    let size_mm = c.input.volume.size_mm();
+    let aspect = c.size[0] as f32 / c.size[1] as f32;
+    let frame = |number| -> Result<Value> {
+        let views = path::views(size_mm, aspect, c.views, number)?;
+        let clip = plan.clip.iter().map(|shape| path::clip(shape, size_mm, number).pose).next();
+        Ok(json!({
+            "views": views.iter().map(view_json).collect::<Vec<_>>(),
+            "clip": clip.map(|pose| json!({
+                "translate_mm": pose.translate_mm.to_array(),
+                "rotate_deg": pose.rotate_deg.to_array(),
+                "scale": pose.scale.to_array(),
+            })),
+        }))
+    };
+    // The path closes.
+    let frames = (0..plan.frames.min(path::PERIOD).into()).map(frame).collect::<Result<Vec<_>>>()?;
+    let look = Method::Cao.look();
+    Ok(json!({
+        "ambient": look.ambient,
+        "diffuse": look.diffuse,
+        "light": look.light.to_array(),
+        "step_mm": look.step(c.input.volume.min_spacing() as f32),
+        "frames": frames,
+    }))
+}
+
+fn view_json(view: &View) -> Value {
+    let tan = view.tan;
     json!({
-        "volume": c.input.name,
-        "dims": c.input.volume.dims,
-        "rays": o.rays.name(),
-        "quadrature": o.quadrature.name(),
-        "radius_mm": o.radius_mm,
-        "view_size": c.size,
-        "views": c.views,
-        "methods": all.iter().map(|m| method_json(m, all)).collect::<Vec<_>>(),
+        "position_mm": view.position.to_array(),
+        "orientation_xyzw": view.orientation.to_array(),
+        "tan": { "left": tan.left, "right": tan.right, "up": tan.up, "down": tan.down },
+        "near_mm": view.near_mm,
+        "far_mm": view.far_mm,
     })
 }
 
-fn method_json(m: &Measured, all: &[Measured]) -> Value {
+/// One configuration and its methods; in a series with its value and the growth since the series' first.
+pub fn as_json(result: &Outcome, first: Option<&Outcome>) -> Value {
+    let (c, all) = (&result.configuration, &result.measured);
+    let o = c.setup.occlusion;
+    let mut methods: Vec<Value> = all.iter().map(|m| method_json(c, m, all)).collect();
+    for ((method, m), first) in methods.iter_mut().zip(all).zip(first.iter().flat_map(|f| &f.measured)) {
+        method["over_first_of_series"] = growth(m, first).into();
+    }
+    let mut json = json!({
+        "volume": c.input.name,
+        "dims": c.input.volume.dims,
+        "rays": o.rays.name(),
+        "radius_mm": o.radius_mm,
+        "view_size": c.size,
+        "views": c.views,
+        "methods": methods,
+    });
+    if first.is_some() {
+        json["value"] = result.value.as_str().into();
+    }
+    json
+}
+
+fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
     let walls = walls(m);
     let parts: Map<String, Value> =
         PARTS.iter().enumerate().map(|(n, name)| (name.replace(' ', "_"), part(m, n).into())).collect();
     json!({
         "method": m.method.name(),
+        "quadrature": m.method.setup(c.setup).occlusion.quadrature.name(),
         "frames": walls.len(),
         "median_ms": median(&walls),
         "p95_ms": percentile(&walls, 95.0),

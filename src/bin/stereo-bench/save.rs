@@ -70,7 +70,8 @@ fn readme(gpu: &Gpu, machine: &str) -> String {
          | driver | {}, Vulkan {major}.{minor}.{patch} |\n\
          | machine | {} |\n\n\
          `summary` is what was printed, `raw.csv` every frame that counts: times in ms, runs from 1, frames from 0. What a frame is, and the\n\
-         path of head and clip, is in `stereo-bench --help`.\n",
+         path of head and clip, is in `stereo-bench --help`. Times of a busy machine or a software driver are good for ratios only; what is\n\
+         compared took turns, frame by frame.\n",
         info.name,
         command(),
         env!("CARGO_PKG_VERSION"),

@@ -1,4 +1,4 @@
-//! Series: one setting varied while the others stay.
+//! Series: one setting varied while the others stay. All points of a series take turns, as the methods do.
 
 use super::common::args::usage;
 use super::frames::{Configuration, Input};

@@ -4,12 +4,13 @@ use super::args::Cli;
 use super::common::args::{open, setup, shape, usage};
 use super::common::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use super::frames::{Configuration, Input, Measured, Plan, measure};
+use super::method::Method;
 use super::path::PERIOD;
 use super::save::Folder;
 use super::{csv, machine, report};
 use anyhow::{Context, Result};
 use cao::gpu::DeviceKind;
-use cao::scene::Method;
+use cao::scene;
 use cao::transfer::TransferFunction;
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
@@ -28,14 +29,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     let mut progress = Progress::new();
     progress.stage("reading");
     let base = base(cli, transfer)?;
-    let series = series(cli, &base, transfer)?;
-    // What several series share is measured once; the base comes first.
-    let mut wanted = vec![base];
-    for (_, configuration) in series.iter().flat_map(|(_, points)| points) {
-        if !wanted.contains(configuration) {
-            wanted.push(configuration.clone());
-        }
-    }
+    let groups = groups(cli, base, transfer)?;
 
     progress.stage("preparing");
     let gpu = open_gpu(&cli.global)?;
@@ -47,15 +41,23 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     let kept = cli.save.as_deref().map(|folder| Folder::new(folder, &gpu)).transpose()?;
     let machine = machine::describe();
     progress.stage("measuring");
-    let total = plan.total() * wanted.len() as u64;
+    let points: usize = groups.iter().map(|group| group.points.len()).sum();
+    let total = plan.total() * points as u64;
     let mut done = 0;
     let mut results = Vec::new();
-    for configuration in wanted {
-        let measured = measure(&gpu, &configuration, &plan, &mut || {
+    for Group { series, points } in groups {
+        let (values, configurations): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        let measured = measure(&gpu, &configurations, &plan, &mut || {
             done += 1;
             progress.set(done as f64 / total as f64);
         })?;
-        results.push((configuration, measured));
+        let points = values.into_iter().zip(configurations).zip(measured);
+        results.extend(points.map(|((value, configuration), measured)| Outcome {
+            series,
+            value,
+            configuration,
+            measured,
+        }));
     }
     check_validation(&gpu)?;
     drop(progress);
@@ -64,7 +66,10 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     out.device(&gpu);
     out.line(format!("machine   {machine}"));
     out.json(json!({ "machine": machine, "version": env!("CARGO_PKG_VERSION") }));
-    say(cli, &mut out, &plan, &series, &results);
+    say(cli, &mut out, &plan, &results);
+    if let Some(base) = results.first() {
+        out.json(json!({ "path": report::path_json(&base.configuration, &plan)? }));
+    }
     let (table, summary) = (csv::table(&results), out.text().to_owned());
     if let Some(path) = &cli.csv {
         std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;
@@ -80,19 +85,26 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
 }
 
 /// What was measured in which way, then the numbers: of the base configuration, which comes first, and of every series.
-fn say(cli: &Cli, out: &mut Out, plan: &Plan, series: &[Points], results: &[(Configuration, Vec<Measured>)]) {
-    let Some((base, measured)) = results.first() else { return };
-    let input = &base.input;
+fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
+    let Some((base, series)) = results.split_first() else { return };
+    let Configuration { input, setup, size, views } = &base.configuration;
     let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
     out.volume(&input.name, &input.volume);
-    out.occlusion(&methods.join(" "), &base.setup, &input.volume);
-    out.line(format!("views     {} of {} x {} pixels, in one pass", base.views, base.size[0], base.size[1]));
+    out.occlusion(&methods.join(" "), setup, &input.volume);
+    if plan.methods.contains(&Method::Sweep) {
+        let (o, spacing) = (Method::Sweep.setup(*setup).occlusion, input.volume.min_spacing());
+        let (rule, step, from) = (o.quadrature.name(), o.lattice_step(spacing), o.lattice_offset(spacing));
+        out.line(format!(
+            "          of sweeps quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
+        ));
+    }
+    out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
     out.line(format!("clip      {}", cli.clip));
     out.line(match cli.all_voxels {
         true => "voxels    all",
         false => "voxels    those that a sample with opacity can touch",
     });
-    out.line(report::tables(plan, measured).trim_end());
+    out.line(report::tables(plan, &base.measured).trim_end());
     out.json(json!({
         "clip": cli.clip,
         "all_voxels": cli.all_voxels,
@@ -100,35 +112,44 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, series: &[Points], results: &[(Con
         "frames_a_run": plan.frames,
         "warm_up_frames": plan.warm_up,
     }));
-    out.json(report::as_json(base, measured));
-    let find = |wanted: &Configuration| -> &[Measured] {
-        let found = results.iter().find(|(configuration, _)| configuration == wanted);
-        found.map_or(&[], |(_, measured)| measured)
-    };
+    out.json(report::as_json(base, None));
     let mut scale = Map::new();
-    for (name, points) in series {
-        let measured = points.iter().map(|(value, configuration)| (value.as_str(), find(configuration)));
-        out.line(report::series_table(name, measured, &plan.methods).trim_end_matches('\n'));
-        let values = points.iter().map(|(value, configuration)| {
-            let mut point = report::as_json(configuration, find(configuration));
-            point["value"] = value.as_str().into();
-            point
-        });
-        scale.insert((*name).into(), values.collect());
+    for points in series.chunk_by(|a, b| a.series == b.series) {
+        out.line(report::series_table(points).trim_end_matches('\n'));
+        let values = points.iter().map(|point| report::as_json(point, points.first()));
+        scale.insert(points[0].series.into(), values.collect());
     }
     out.json(json!({ "scale": scale }));
 }
 
-/// A series' name, and its values with their configurations.
-type Points = (&'static str, Vec<(String, Configuration)>);
+/// One configuration with what was measured.
+pub struct Outcome {
+    /// Name of the series; "base" for what the command line says.
+    pub series: &'static str,
+    /// What is varied, in words.
+    pub value: String,
+    pub configuration: Configuration,
+    /// In the order of the methods.
+    pub measured: Vec<Measured>,
+}
 
-fn series(cli: &Cli, base: &Configuration, transfer: &str) -> Result<Vec<Points>> {
-    for (n, series) in cli.scale.iter().enumerate() {
-        if cli.scale[..n].contains(series) {
+/// Configurations that take turns.
+struct Group {
+    series: &'static str,
+    /// The value of what is varied, in words, and the configuration.
+    points: Vec<(String, Configuration)>,
+}
+
+/// The base configuration by itself, then every series.
+fn groups(cli: &Cli, base: Configuration, transfer: &str) -> Result<Vec<Group>> {
+    let mut groups = vec![Group { series: "base", points: vec![(String::new(), base.clone())] }];
+    for series in &cli.scale {
+        if groups.iter().any(|group| group.series == series.name()) {
             return Err(usage(format!("--scale: {} is given twice", series.name())));
         }
+        groups.push(Group { series: series.name(), points: series.configurations(&base, transfer)? });
     }
-    cli.scale.iter().map(|series| Ok((series.name(), series.configurations(base, transfer)?))).collect()
+    Ok(groups)
 }
 
 fn plan(cli: &Cli) -> Result<Plan> {
@@ -147,7 +168,7 @@ fn plan(cli: &Cli) -> Result<Plan> {
 
 fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
-    let setup = setup(&cli.settings, &volume, Method::Cao, cli.all_voxels)?;
+    let setup = setup(&cli.settings, &volume, scene::Method::Cao, cli.all_voxels)?;
     let transfer = TransferFunction::load(transfer, volume.range())?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })

@@ -82,7 +82,11 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     let height = legend_top + 44.0 + 15.0 * caption.len() as f64 + 10.0;
     let mut drawing = Drawing::new(WIDTH, height);
     let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
-    let title = format!("Ambient occlusion after a change: time against error. {}", names.join(", "));
+    let title = |of: &str| format!("Ambient occlusion after a change: time against error. {of}");
+    let named = title(&names.join(", "));
+    // The caption names them too.
+    let fits = text_width(&named, 16) < WIDTH - LEFT;
+    let title = if fits { named } else { title(&format!("{} scenes", names.len())) };
     drawing.text([LEFT, 28.0], &title, 16, Anchor::Start, INK, true);
 
     let panels: Vec<(Change, Vec<Mark>)> =

@@ -81,7 +81,8 @@ impl Scene {
         match change {
             Change::Volume => {}
             Change::Clip => {
-                let step = Vec3::X * (CLIP_VOXELS * self.volume.min_spacing()) as f32;
+                // Along no axis, for a plane may face any of them; towards the centre from the default clip's corner.
+                let step = Vec3::new(-1.0, 1.0, -1.0) * (CLIP_VOXELS * self.volume.min_spacing()) as f32;
                 state.clips.iter_mut().for_each(|clip| clip.pose.translate_mm += step);
             }
             Change::Transfer => {
@@ -97,8 +98,8 @@ impl Scene {
     }
 }
 
-/// "Clip moved": by this many voxels along x.
-pub const CLIP_VOXELS: f64 = 2.0;
+/// "Clip moved": by this many voxels along each axis.
+pub const CLIP_VOXELS: f64 = 1.0;
 /// "Transfer function edited": opacities times this.
 pub const OPACITY_FACTOR: f32 = 0.9;
 /// "Radius changed": times this.
@@ -223,6 +224,11 @@ const MEMORY: usize = 1 << 30;
 /// Bytes a voxel of one contender (`Volumes`, the volume, and a little).
 const VOXEL: usize = 24;
 
+/// How many compete with the baseline at a time.
+fn group(scene: &Scene) -> usize {
+    (MEMORY / (VOXEL * scene.volume.len()).max(1)).max(2) - 1
+}
+
 /// Points of the surface at which image-space methods are held to the reference.
 const SURFACE: usize = 1000;
 /// Points of the surface in a picture of errors; and for a first look.
@@ -279,12 +285,17 @@ impl Work {
         let samples = f64::from(scene.state.radius_mm) / scene.volume.min_spacing();
         let samples = samples * f64::from(plan.steps_per_voxel) * f64::from(plan.directions);
         // The checked ones at twice both resolutions, the surface; its kernel skips what is empty.
-        0.5 * samples * (plan.max_voxels.min(scene.volume.len() / 5) + 4 * 1000 + SURFACE) as f64
+        0.2 * samples * (2 * plan.max_voxels.min(scene.volume.len() / 5) + SURFACE) as f64
     }
 
     fn of(scene: &Scene, plan: &Plan) -> f64 {
         let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
-        let updates: f64 = contender::all(&asked).iter().map(|entry| Self::update(scene, entry)).sum();
+        let entries = contender::all(&asked);
+        let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting));
+        // The baseline competes in every group.
+        let groups = (entries.len() - 1).div_ceil(group(scene)) as f64;
+        let again = baseline.map_or(0.0, |entry| (groups - 1.0) * Self::update(scene, entry));
+        let updates = again + entries.iter().map(|entry| Self::update(scene, entry)).sum::<f64>();
         let changes = Change::ALL.len() as f64;
         changes * (updates * f64::from(plan.runs + 1) + Self::reference(scene, plan)) + updates
     }
@@ -324,7 +335,6 @@ fn one(
     let mut entries = contender::all(&asked);
     let at = entries.iter().position(|e| is_baseline(e.method, &e.setting)).ok_or_else(no_baseline)?;
     let baseline = entries.remove(at);
-    let group = (MEMORY / (VOXEL * scene.volume.len()).max(1)).max(2) - 1;
     let mut points = Vec::new();
     let mut draws = Vec::new();
     let mut shown = Vec::new();
@@ -332,18 +342,21 @@ fn one(
         true => pictures::featured(std::iter::once(&baseline).chain(&entries)),
         false => Vec::new(),
     };
-    for (n, others) in entries.chunks(group).enumerate() {
+    for (n, others) in entries.chunks(group(scene)).enumerate() {
         let compete: Vec<&Entry> = std::iter::once(&baseline).chain(others).collect();
         let found = compete_in(scene, subject, plan, &compete, &truths, &featured, work, say)?;
         // The baseline's first runs stand for it.
         let own = usize::from(n > 0);
         points.extend(found.0.into_iter().skip(own * Change::ALL.len()));
-        draws.extend(found.1);
+        for (method, ms) in found.1 {
+            if !draws.iter().any(|(known, _)| *known == method) {
+                draws.push((method, ms));
+            }
+        }
         shown.extend(found.2);
     }
     shown.sort_by_key(|shown| contender::place(shown.method));
     shown.dedup_by_key(|shown| shown.method);
-    draws.dedup_by_key(|(method, _)| *method);
     let names: Vec<&str> = scene.state.clips.iter().map(|clip| clip.shape.name()).collect();
     Ok(SceneChart {
         name: scene.name.clone(),
@@ -396,7 +409,8 @@ fn compete_in(
                 say(change.name(), work);
                 let stages = contender.update(change, states[run % 2])?;
                 work.done += Work::update(scene, entry);
-                let total_ms: f64 = stages.iter().map(|(_, ms)| ms).sum();
+                // The sum of nothing is -0.
+                let total_ms = 0.0 + stages.iter().map(|(_, ms)| ms).sum::<f64>();
                 if run == 0 {
                     points[n].push(truth.judge(scene, subject, entry, change, &contender.ambient()?));
                     continue;
@@ -618,12 +632,13 @@ impl Chart {
             self.plan.runs
         ));
         lines.push(format!(
-            "Changes: clip moved by {CLIP_VOXELS} voxels, opacities and radius times {OPACITY_FACTOR} and {RADIUS_FACTOR}, or all values new, and back again. Copying a new volume to the device is not counted."
+            "Changes: clip moved by {CLIP_VOXELS} voxel along each axis, opacities and radius times {OPACITY_FACTOR} and {RADIUS_FACTOR}, or all values new, and back again. Copying a new volume to the device is not counted."
         ));
         lines.push(format!(
-            "Image space: {} x {} pixels an eye, both eyes; it has to be done again for every frame in which the head moves.",
+            "Image space has values on the surface in the image only, {} x {} pixels an eye: its errors are at those points, against the reference there, and it",
             self.plan.size[0], self.plan.size[1]
         ));
+        lines.push("competes for no front; its values are halved, for it shades half a sphere. It has to be done again whenever the head moves.".into());
         lines
     }
 }

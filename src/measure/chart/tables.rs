@@ -267,13 +267,13 @@ pub(super) fn everything(chart: &Chart, change: Change) -> String {
                 if front.contains(&i) { "●".into() } else { String::new() },
                 escaped(mark.of.method),
                 escaped(&mark.of.setting.name()),
-                escaped(&mark.of.setting.details),
                 if mark.time[1] > 0.0 { time(chart, mark.time) } else { "no cost".into() },
                 format!("{:.4}", mark.error),
                 mean(mark, &|p| Some(p.shape.rmse)),
                 mean(mark, &|p| Some(p.errors.bias)),
                 mean(mark, &largest),
                 mean(mark, &|p| p.ssim_3d),
+                escaped(&mark.of.setting.details),
             ]
         })
         .collect();
@@ -281,15 +281,15 @@ pub(super) fn everything(chart: &Chart, change: Change) -> String {
         "front",
         "method",
         "setting",
-        "details",
         "time",
         "RMSE",
-        "RMSE, tone fitted",
+        "tone fitted",
         "bias",
         "largest",
         "SSIM-3D",
+        "details",
     ];
-    table(&head, 4, &rows)
+    table(&head, 3, &rows)
 }
 
 /// What `tools/peers` measured.

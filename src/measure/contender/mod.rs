@@ -1,8 +1,8 @@
 //! Contenders of the chart (measure.md §3): one method of ambient occlusion at one setting each, that brings its ambient
 //! values up to date after a change and says what each stage of that cost.
 //!
-//! A new method joins by one file here, its `mod` line and its line in [`METHODS`]: a function that lists its settings
-//! as [`Entry`]s, each of which opens a [`Contender`]. Where a [`Renderer`](crate::renderer::Renderer) does the work, [`rendered`] is all it takes.
+//! A new method joins by one file here, its `mod` line and its line in `METHODS`: a function that lists its settings
+//! as [`Entry`]s, each of which opens a [`Contender`]. Where a [`Renderer`](crate::renderer::Renderer) does the work, `rendered` is all it takes.
 
 mod cao;
 mod cao_literal;

@@ -1,0 +1,82 @@
+// Lines of a sweep and the list of their parts that have something to compute.
+//
+// A line is named by its place (u, w) on the two axes across the walk and by its layer r, the voxel of the walk's axis it
+// begins at. Its step i is at voxel (u + i du, w + i dw, r + i |da|), the first two modulo the volume; walked from the upper
+// end where da < 0.
+
+// Largest group count along one axis that every device has.
+const GROUPS_PER_ROW = 65535u;
+const TILE = 8u;
+// Segments of a chunk, the last window permitting.
+const CHUNK = 8;
+
+// Chunks `first` ... `first + count` of the lines of a tile, the first being the one in whose steps the ray backwards from
+// step 0 is found.
+struct Run {
+    tile: u32,
+    first: u32,
+    count: u32,
+}
+
+struct SweepHead {
+    // arguments of an indirect dispatch
+    groups_x: u32,
+    groups_y: u32,
+    groups_z: u32,
+    count: u32,
+    // first run
+    at: u32,
+}
+
+struct SweepList {
+    head: array<SweepHead, 54>,
+    runs: array<Run>,
+}
+
+// The axes across a walk: the faster first.
+fn line_axes(axis: u32) -> vec2<u32> {
+    return vec2(select(0u, 1u, axis == 0u), select(2u, 1u, axis == 2u));
+}
+
+fn line_extent(axis: u32, dims: vec3<i32>) -> vec2<i32> {
+    let across = line_axes(axis);
+    return vec2(dims[across.x], dims[across.y]);
+}
+
+// Place u, w and layer of a line of a tile.
+fn line_at(tile: u32, local: vec2<u32>, tiles: vec2<u32>, axis: u32, dims: vec3<i32>) -> vec3<i32> {
+    let place = vec2(tile % tiles.x, tile / tiles.x % tiles.y) * TILE + local;
+    return vec3(vec2<i32>(place), i32(tile / (tiles.x * tiles.y)));
+}
+
+// Number of a line's voxels.
+fn line_steps(layer: i32, axis: u32, dims: vec3<i32>, step: vec3<i32>) -> i32 {
+    let stride = abs(step[axis]);
+    return (dims[axis] - layer + stride - 1) / stride;
+}
+
+// Chunk c is the steps c size ... c size + size - 1.
+fn chunk_size(window: i32) -> i32 {
+    return min(window, CHUNK);
+}
+
+// Rays that end in a chunk and go backwards begin up to so many chunks further on.
+fn chunk_lag(window: i32) -> i32 {
+    let size = chunk_size(window);
+    return (window + size) / size;
+}
+
+// Into 0 ... dims - 1.
+fn wrapped(p: vec3<i32>, dims: vec3<i32>) -> vec3<i32> {
+    let rest = p % dims;
+    return rest + select(vec3(0), dims, rest < vec3(0));
+}
+
+fn line_position(line: vec3<i32>, i: i32, axis: u32, dims: vec3<i32>, step: vec3<i32>) -> vec3<i32> {
+    let across = line_axes(axis);
+    var begin = vec3(0);
+    begin[across.x] = line.x;
+    begin[across.y] = line.y;
+    begin[axis] = select(line.z, dims[axis] - 1 - line.z, step[axis] < 0);
+    return wrapped(begin + i * step, dims);
+}

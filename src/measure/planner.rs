@@ -1,0 +1,514 @@
+//! The cheapest settings that are accurate enough, or the most accurate that are quick enough, for the scene at hand (measure.md §5).
+//!
+//! A calibration computes sample bricks of the scene with each candidate's settings on the device and compares them with the
+//! ambient reference. One brick in each of [`SAMPLES`] equal runs of the bricks that need values stands for them all:
+//!
+//! ```text
+//! rmse² = Σ_b n_b e_b / Σ_b n_b          e_b mean squared error of sample brick b, n_b its voxels that count
+//! bound² = rmse² + 2 √(Σ_b (n_b/n̄)² (e_b − rmse²)² / (B (B − 1)))       two standard errors of that ratio
+//! ms = time of a sample brick among many · bricks that an update computes
+//! ```
+//!
+//! An error budget takes the cheapest candidate whose `bound` it holds, a time budget the most accurate one whose `ms` leaves it
+//! [`TIME_MARGIN`].
+
+use super::error::errors;
+use super::random::Random;
+use super::reference::{Plan, ambient_in};
+use crate::cpu::Grid;
+use crate::gpu::Gpu;
+use crate::method::trial::Trial;
+use crate::occlusion::{Occlusion, Quadrature, RaySet};
+use crate::renderer::{Renderer, Setup};
+use crate::scene::Method;
+use crate::stage::field::BRICK;
+use crate::stage::lao::Scope;
+use crate::{Error, Result};
+
+/// Bricks that errors and times are measured on.
+pub const SAMPLES: usize = 24;
+
+/// Voxels of each of them that are compared with the reference.
+const VOXELS: usize = 48;
+
+/// Fine enough: at 512 directions and four steps a voxel the reference itself moves by some 0.001 when both are doubled, which adds less
+/// than a twentieth to the error of the most accurate settings.
+const REFERENCE: Plan = Plan { directions: 512, steps_per_voxel: 4, max_voxels: usize::MAX };
+
+/// A time budget must be this much longer than the time that is foreseen.
+pub const TIME_MARGIN: f64 = 1.25;
+
+/// How far a foreseen time may be off, as a factor: sample bricks are not all bricks, and machines do other things.
+pub const TIME_FACTOR: f64 = 3.0;
+
+/// What settings may cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// Root mean square error of ambient factors, 0 … 1, against the ambient reference.
+    Error(f64),
+    /// Milliseconds of the device to compute all ambient factors.
+    Milliseconds(f64),
+}
+
+/// Settings to choose from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// [`Method::Lao`] and [`Method::Cao`] cast the same rays, and count as the same here.
+    pub method: Method,
+    /// Rays, rule, lengths.
+    pub occlusion: Occlusion,
+}
+
+impl std::fmt::Display for Candidate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Occlusion { rays, quadrature, .. } = self.occlusion;
+        write!(f, "method {}, rays {}, quadrature {}", self.method.name(), rays.name(), quadrature.name())
+    }
+}
+
+/// What a calibration found of one candidate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Root mean square error on the sample bricks.
+    pub rmse: f64,
+    /// What the error of the whole scene is expected not to exceed: two standard errors more.
+    pub bound: f64,
+    /// Foreseen time in ms of computing all ambient factors.
+    pub ms: f64,
+}
+
+/// What a calibration found.
+#[derive(Clone, Debug)]
+pub struct Calibration {
+    /// Every candidate, in the order given.
+    pub measured: Vec<Measured>,
+    /// Sample bricks (x fastest), [`SAMPLES`] or all.
+    pub bricks: Vec<u32>,
+    /// Bricks with a voxel that counts.
+    pub needed: Vec<u32>,
+}
+
+/// What may be chosen in place of `setup`, with its lengths: rays cast by the method that it has, by every set and rule, and sweeps,
+/// by the sets with weights (and 6 rays, whose weights are equal anyway); or only this method, these rays, this rule.
+pub fn candidates(
+    setup: &Setup,
+    method: Option<Method>,
+    rays: Option<RaySet>,
+    quadrature: Option<Quadrature>,
+) -> Vec<Candidate> {
+    let mut list = Vec::new();
+    for set in RaySet::ALL.into_iter().filter(|set| rays.is_none_or(|only| *set == only)) {
+        for rule in Quadrature::ALL.into_iter().filter(|rule| quadrature.is_none_or(|only| *rule == only)) {
+            let occlusion = Occlusion { rays: set, quadrature: rule, ..setup.occlusion };
+            let cast = method.unwrap_or(if setup.method == Method::Lao { Method::Lao } else { Method::Cao });
+            if cast != Method::Sweep {
+                list.push(Candidate { method: cast, occlusion });
+            }
+            let weighted = matches!(set, RaySet::R6 | RaySet::W14 | RaySet::W26 | RaySet::W50);
+            let swept = method.unwrap_or(Method::Sweep) == Method::Sweep;
+            if swept && rule == Method::Sweep.quadrature() && (weighted || rays.is_some()) {
+                list.push(Candidate { method: Method::Sweep, occlusion });
+            }
+        }
+    }
+    list
+}
+
+/// Tries every candidate on sample bricks of the scene as it is; sweeps are timed as a whole, since a brick swept alone costs more
+/// than among its neighbours. The renderer's ambient volume is out of date afterwards and its setup may be another.
+/// `progress` hears the share done (0 … 1). Uses the device's queue and waits for it.
+///
+/// # Errors
+/// Those of the device. Candidates that this volume or device cannot have are left out.
+pub fn calibrate(
+    renderer: &mut Renderer,
+    candidates: &[Candidate],
+    progress: &mut dyn FnMut(f64),
+) -> Result<Calibration> {
+    let all = renderer.field().brick_count();
+    let scope = renderer.setup().scope;
+    let needed = Scene::new(renderer)?.needed();
+    let bricks = sample(&needed);
+    let (timed, computed) = match scope {
+        Scope::Needed => (bricks.clone(), needed.len()),
+        Scope::All => (sample(&(0..all).collect::<Vec<_>>()), all as usize),
+    };
+    let measured = measure(renderer, candidates, &bricks, (&timed, computed), progress)?;
+    Ok(Calibration { measured, bricks, needed })
+}
+
+/// The same with errors on bricks of one's own choice. `timed` are the bricks that cast rays are timed on, and the number of bricks
+/// that they stand for.
+pub fn measure(
+    renderer: &mut Renderer,
+    candidates: &[Candidate],
+    bricks: &[u32],
+    timed: (&[u32], usize),
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Measured>> {
+    let Some(like) = candidates.first() else { return Ok(Vec::new()) };
+    let setup = *renderer.setup();
+    let mut measured: Vec<Option<Measured>> = vec![None; candidates.len()];
+    let scene = Scene::new(renderer)?;
+    let samples = scene.samples(bricks, &like.occlusion, &mut |part| progress(0.4 * part))?;
+    let mut done = 0;
+    let mut step = |progress: &mut dyn FnMut(f64)| {
+        done += 1;
+        progress(0.4 + 0.6 * f64::from(done) / candidates.len() as f64);
+    };
+    for (candidate, measured) in candidates.iter().zip(&mut measured) {
+        if candidate.method != Method::Sweep {
+            let (rmse, bound, brick_ms) = scene.cast(&candidate.occlusion, bricks, &samples, timed.0)?;
+            *measured = Some(Measured { candidate: *candidate, rmse, bound, ms: brick_ms * timed.1 as f64 });
+            step(progress);
+        }
+    }
+    drop(scene);
+    for (candidate, measured) in candidates.iter().zip(&mut measured) {
+        if candidate.method == Method::Sweep {
+            let Candidate { method, occlusion } = *candidate;
+            match renderer.set_setup(Setup { method, occlusion, ..setup }) {
+                Ok(()) => {
+                    let (values, ms) = swept(renderer)?;
+                    let (rmse, bound) = judge(&samples, |_, voxel| values[voxel]);
+                    *measured = Some(Measured { candidate: *candidate, rmse, bound, ms });
+                }
+                Err(Error::Config { .. } | Error::Limit { .. }) => {}
+                Err(error) => return Err(error),
+            }
+            step(progress);
+        }
+    }
+    Ok(measured.into_iter().flatten().collect())
+}
+
+/// Ambient factors of everything by the renderer's sweep, and the median time in ms of the sweep.
+fn swept(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
+    let mut times = Vec::new();
+    for _ in 0..3 {
+        renderer.invalidate();
+        let timings = renderer.update(&mut |_| ())?;
+        times.push(timings.iter().filter(|(stage, _)| stage == "sweep").map(|(_, ms)| ms).sum::<f64>());
+        if times[0] > LONG_ENOUGH_MS {
+            break;
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    Ok((renderer.read_ambient()?, times[times.len() / 2]))
+}
+
+/// A sweep of this many ms is not timed again.
+const LONG_ENOUGH_MS: f64 = 200.0;
+
+impl Calibration {
+    /// The candidate to take.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where none fits, with what can be reached.
+    pub fn choose(&self, budget: Budget) -> Result<Measured> {
+        let by = |key: fn(&Measured) -> f64| move |a: &&Measured, b: &&Measured| key(a).total_cmp(&key(b));
+        let fitting = self.measured.iter().filter(|m| budget.holds(m));
+        let chosen = match budget {
+            Budget::Error(_) => fitting.min_by(by(|m| m.ms)),
+            Budget::Milliseconds(_) => fitting.min_by(by(|m| m.bound)),
+        };
+        let best = match budget {
+            Budget::Error(_) => self.measured.iter().min_by(by(|m| m.bound)),
+            Budget::Milliseconds(_) => self.measured.iter().min_by(by(|m| m.ms)),
+        };
+        if let Some(chosen) = chosen {
+            return Ok(*chosen);
+        }
+        let refuse = |what: &str, problem: String| Error::Config { what: what.into(), problem };
+        let Some(best) = best else {
+            return Err(refuse("budget", "no settings to choose from".into()));
+        };
+        let name = best.candidate;
+        Err(match budget {
+            Budget::Error(most) => refuse(
+                "error budget",
+                format!(
+                    "{most} is less than any of the {} settings tried reaches in this scene; the most accurate, {name}, errs by \
+                     up to {:.2e}: ask for that or more, or for other lengths",
+                    self.measured.len(),
+                    best.bound
+                ),
+            ),
+            Budget::Milliseconds(most) => refuse(
+                "time budget",
+                format!(
+                    "{most} ms is less than any of the {} settings tried takes for this scene; the quickest, {name}, takes about \
+                     {:.3} ms: ask for {:.3} or more, or for a shorter radius",
+                    self.measured.len(),
+                    best.ms,
+                    best.ms * TIME_MARGIN
+                ),
+            ),
+        })
+    }
+
+    /// The best candidate on the other side of the budget: what it would have to be for less time, or for a smaller error.
+    pub fn runner_up(&self, budget: Budget) -> Option<Measured> {
+        let missed = self.measured.iter().filter(|m| !budget.holds(m)).copied();
+        match budget {
+            Budget::Error(_) => missed.min_by(|a, b| a.bound.total_cmp(&b.bound)),
+            Budget::Milliseconds(_) => missed.min_by(|a, b| a.ms.total_cmp(&b.ms)),
+        }
+    }
+}
+
+impl Budget {
+    fn holds(self, measured: &Measured) -> bool {
+        match self {
+            Self::Error(most) => measured.bound <= most,
+            Self::Milliseconds(most) => measured.ms * TIME_MARGIN <= most,
+        }
+    }
+}
+
+/// One in each of [`SAMPLES`] equal runs, or all. The same each time.
+fn sample(bricks: &[u32]) -> Vec<u32> {
+    if bricks.len() <= SAMPLES {
+        return bricks.to_vec();
+    }
+    let mut random = Random::new(1);
+    let run = |i: usize| i * bricks.len() / SAMPLES;
+    (0..SAMPLES).map(|i| bricks[run(i) + random.below((run(i + 1) - run(i)) as u64) as usize]).collect()
+}
+
+/// The scene as trials see it.
+struct Scene<'a> {
+    gpu: Gpu,
+    grid: Grid,
+    opacity: Vec<f32>,
+    trial: Trial<'a>,
+}
+
+impl<'a> Scene<'a> {
+    fn new(renderer: &'a mut Renderer) -> Result<Self> {
+        let gpu = renderer.gpu().clone();
+        let field = renderer.field();
+        let grid = Grid { dims: field.dims.map(|d| d as usize), spacing: field.spacing.map(f64::from) };
+        let (trial, opacity) = renderer.trial()?;
+        Ok(Self { gpu, grid, opacity, trial })
+    }
+
+    /// Whether a sample with opacity can interpolate a voxel.
+    fn counts(&self, voxel: usize) -> bool {
+        let solid = |voxel: [usize; 3]| self.opacity[self.grid.index(voxel)] > 0.0;
+        let voxel = self.grid.voxel(voxel);
+        solid(voxel) || self.grid.neighbours(voxel).any(solid)
+    }
+
+    /// Bricks with a voxel that counts.
+    fn needed(&self) -> Vec<u32> {
+        let edge = BRICK as usize;
+        let bricks = self.grid.dims.map(|d| d.div_ceil(edge));
+        let mut needed = vec![false; bricks.iter().product()];
+        for voxel in (0..self.opacity.len()).filter(|voxel| self.opacity[*voxel] > 0.0) {
+            let at = self.grid.voxel(voxel);
+            // The bricks of its neighbours: one along each axis, or two at a brick's face.
+            let low = at.map(|c| c.saturating_sub(1) / edge);
+            let high: [usize; 3] = std::array::from_fn(|a| (at[a] + 1).min(self.grid.dims[a] - 1) / edge);
+            for z in low[2]..=high[2] {
+                for y in low[1]..=high[1] {
+                    for x in low[0]..=high[0] {
+                        needed[(z * bricks[1] + y) * bricks[0] + x] = true;
+                    }
+                }
+            }
+        }
+        (0..needed.len() as u32).filter(|brick| needed[*brick as usize]).collect()
+    }
+
+    /// Voxels of a brick that count, as indices in the volume.
+    fn counting(&self, brick: u32) -> Vec<usize> {
+        let (first, size) = self.trial.brick(brick);
+        let place = |i: u32| {
+            let inside = [i % size[0], i / size[0] % size[1], i / (size[0] * size[1])];
+            self.grid.index(std::array::from_fn(|a| (first[a] + inside[a]) as usize))
+        };
+        (0..size.iter().product()).map(place).filter(|voxel| self.counts(*voxel)).collect()
+    }
+
+    /// Some voxels of each brick that count, and their reference for settings with the lengths of `like`.
+    fn samples(
+        &self,
+        bricks: &[u32],
+        like: &Occlusion,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Vec<Sample>> {
+        let counting: Vec<Vec<usize>> = bricks.iter().map(|brick| self.counting(*brick)).collect();
+        let mut random = Random::new(2);
+        let mut some = |all: &Vec<usize>| -> Vec<usize> {
+            let count = VOXELS.min(all.len());
+            let run = |i: usize| i * all.len() / count;
+            (0..count).map(|i| all[run(i) + random.below((run(i + 1) - run(i)) as u64) as usize]).collect()
+        };
+        let compared: Vec<Vec<usize>> = counting.iter().map(&mut some).collect();
+        // The integral that a ray's samples stand for begins half a step before the first.
+        let smallest = self.grid.min_spacing();
+        let offset = f64::from(like.first(smallest)) - 0.5 * f64::from(like.step(smallest));
+        let reference = ambient_in(
+            &self.gpu,
+            &self.grid,
+            &self.opacity,
+            &compared,
+            f64::from(like.radius_mm),
+            offset,
+            self.trial.reference_mm().into(),
+            &REFERENCE,
+            progress,
+        )?;
+        let parts = counting.iter().zip(compared).zip(reference);
+        Ok(parts
+            .map(|((all, voxels), reference)| Sample { counting: all.len(), voxels, reference })
+            .collect())
+    }
+
+    /// Error, its bound, and the time in ms of one of the bricks `timed`, of cast rays.
+    fn cast(
+        &self,
+        occlusion: &Occlusion,
+        bricks: &[u32],
+        samples: &[Sample],
+        timed: &[u32],
+    ) -> Result<(f64, f64, f64)> {
+        let (values, mut ms) = self.trial.run(occlusion, bricks)?;
+        if timed != bricks {
+            ms = self.trial.run(occlusion, timed)?.1;
+        }
+        let (rmse, bound) = judge(samples, |b, voxel| {
+            let (first, size) = self.trial.brick(bricks[b]);
+            let at = self.grid.voxel(voxel);
+            let [x, y, z]: [usize; 3] = std::array::from_fn(|a| at[a] - first[a] as usize);
+            values[b][(z * size[1] as usize + y) * size[0] as usize + x]
+        });
+        Ok((rmse, bound, ms))
+    }
+}
+
+/// What is compared in a sample brick.
+struct Sample {
+    /// Voxels that count.
+    counting: usize,
+    /// Those of them that are compared, as indices in the volume.
+    voxels: Vec<usize>,
+    /// Their ambient reference.
+    reference: Vec<f32>,
+}
+
+/// Root mean square error and its bound of values, told the number of a brick and a voxel of it.
+fn judge(samples: &[Sample], value: impl Fn(usize, usize) -> f32) -> (f64, f64) {
+    let brick = |(b, sample): (usize, &Sample)| {
+        let values: Vec<f32> = sample.voxels.iter().map(|voxel| value(b, *voxel)).collect();
+        (sample.counting as f64, errors(&values, &sample.reference, &vec![true; values.len()]).mse)
+    };
+    spread(&samples.iter().enumerate().map(brick).collect::<Vec<_>>())
+}
+
+/// Root mean square error and its bound from (voxels, mean squared error) of sample bricks. A single brick says nothing of
+/// others, so its bound is none; where there is no brick, there is no error.
+fn spread(bricks: &[(f64, f64)]) -> (f64, f64) {
+    let count = bricks.len() as f64;
+    let voxels: f64 = bricks.iter().map(|b| b.0).sum();
+    if bricks.is_empty() {
+        return (0.0, 0.0);
+    }
+    let mse = bricks.iter().map(|(n, e)| n * e).sum::<f64>() / voxels;
+    let squares: f64 = bricks.iter().map(|(n, e)| (n * count / voxels * (e - mse)).powi(2)).sum();
+    let deviation = if bricks.len() > 1 { (squares / (count * (count - 1.0))).sqrt() } else { 0.0 };
+    (mse.sqrt(), (mse + 2.0 * deviation).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn calibration(list: &[(f64, f64)]) -> Calibration {
+        let candidate = Candidate { method: Method::Lao, occlusion: Occlusion::paper(1.0) };
+        let one = |&(bound, ms): &(f64, f64)| Measured { candidate, rmse: 0.9 * bound, bound, ms };
+        Calibration { measured: list.iter().map(one).collect(), bricks: vec![0], needed: vec![0] }
+    }
+
+    #[test]
+    fn an_error_budget_takes_the_cheapest_that_holds_and_a_time_budget_the_most_accurate() {
+        let c = calibration(&[(0.05, 1.0), (0.02, 4.0), (0.03, 3.0), (0.01, 9.0), (0.02, 5.0)]);
+        for (budget, ms) in [(0.9, 1.0), (0.05, 1.0), (0.049, 3.0), (0.029, 4.0), (0.015, 9.0), (0.01, 9.0)] {
+            assert_eq!(c.choose(Budget::Error(budget)).unwrap().ms, ms, "{budget}");
+        }
+        for (budget, bound) in [(1.25, 0.05), (4.9, 0.03), (5.0, 0.02), (11.0, 0.02), (100.0, 0.01)] {
+            assert_eq!(c.choose(Budget::Milliseconds(budget)).unwrap().bound, bound, "{budget}");
+        }
+        // What there would be on the other side.
+        assert_eq!(c.runner_up(Budget::Error(0.029)).unwrap().bound, 0.03);
+        assert_eq!(c.runner_up(Budget::Milliseconds(4.9)).unwrap().ms, 4.0);
+        assert_eq!(c.runner_up(Budget::Error(0.9)), None);
+    }
+
+    #[test]
+    fn a_tighter_budget_never_takes_a_cheaper_setting_with_a_larger_error() {
+        let mut random = Random::new(3);
+        for _ in 0..200 {
+            let list: Vec<_> = (0..1 + random.below(30))
+                .map(|_| (f64::from(random.between(0.001, 0.1)), f64::from(random.between(0.1, 50.0))))
+                .collect();
+            let c = calibration(&list);
+            let budgets: Vec<f64> = (1..100).map(|i| 0.001 * f64::from(i)).collect();
+            let chosen: Vec<_> = budgets.iter().map(|b| c.choose(Budget::Error(*b))).collect();
+            for (i, tight) in chosen.iter().enumerate() {
+                let Ok(tight) = tight else { continue };
+                assert!(tight.bound <= budgets[i]);
+                for loose in &chosen[i..] {
+                    assert!(loose.as_ref().unwrap().ms <= tight.ms, "a looser budget must not cost more");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_had_is_refused_with_what_can() {
+        let c = calibration(&[(0.05, 1.0), (0.02, 4.0)]);
+        let said = c.choose(Budget::Error(0.019)).unwrap_err().to_string();
+        assert!(said.contains("0.019") && said.contains("2.00e-2") && said.contains("rays 26"), "{said}");
+        let said = c.choose(Budget::Milliseconds(1.2)).unwrap_err().to_string();
+        assert!(said.contains("1.2 ms") && said.contains("1.000 ms") && said.contains("1.250"), "{said}");
+        assert!(calibration(&[]).choose(Budget::Error(1.0)).is_err());
+        assert!(c.choose(Budget::Error(f64::NAN)).is_err());
+    }
+
+    /// Two bricks of equal size with errors 1 and 3: mean 2, deviation √(2·1/2) = 1, bound 2 + 2.
+    #[test]
+    fn bounds_by_hand() {
+        assert_eq!(spread(&[]), (0.0, 0.0));
+        assert_eq!(spread(&[(5.0, 4.0)]), (2.0, 2.0));
+        assert_eq!(spread(&[(7.0, 1.0), (7.0, 3.0)]), (2.0_f64.sqrt(), 2.0));
+        // A brick with three times the voxels counts three times.
+        assert_eq!(spread(&[(1.0, 4.0), (3.0, 0.0)]).0, 1.0);
+        assert!(spread(&[(1.0, f64::NAN), (1.0, 1.0)]).1.is_nan());
+    }
+
+    #[test]
+    fn flags_limit_the_candidates() {
+        let mut setup = Setup::paper(1.0);
+        setup.occlusion.radius_mm = 7.0;
+        let count = |list: &[Candidate], method| list.iter().filter(|c| c.method == method).count();
+        let all = candidates(&setup, None, None, None);
+        assert!(all.iter().all(|c| c.occlusion.radius_mm == 7.0));
+        assert_eq!(count(&all, Method::Cao), RaySet::ALL.len() * Quadrature::ALL.len());
+        assert_eq!((count(&all, Method::Lao), count(&all, Method::Sweep)), (0, 4));
+        let lao = candidates(&Setup { method: Method::Lao, ..setup }, None, None, None);
+        assert_eq!((count(&lao, Method::Cao), count(&lao, Method::Lao)), (0, 21));
+
+        let some = candidates(&setup, None, Some(RaySet::R26), None);
+        assert!(some.iter().all(|c| c.occlusion.rays == RaySet::R26));
+        assert_eq!((count(&some, Method::Cao), count(&some, Method::Sweep)), (3, 1));
+        let some = candidates(&setup, Some(Method::Lao), None, Some(Quadrature::Segment));
+        assert!(some.len() == 7 && some.iter().all(|c| c.occlusion.quadrature == Quadrature::Segment));
+        // Sweeps have one rule.
+        assert_eq!(candidates(&setup, None, None, Some(Quadrature::Left)).len(), 7);
+        assert_eq!(candidates(&setup, Some(Method::Sweep), None, Some(Quadrature::Left)), []);
+    }
+}

@@ -1,0 +1,212 @@
+//! Line sweep (method.md §4): the window of every voxel along one lattice direction by two scans,
+//! `A_k(x) = S_k / (W − o/|v|)` with `(t, S) = head ∘ suffix ∘ prefix` of affine pairs, summed as
+//! `V_AO(x) = 1 − Σ_k w_k (1 − A_k(x))`, equal to evaluating each window directly ([`crate::cpu::sweep`]) up to rounding.
+//!
+//! In: `opacity` V_o (3D r16unorm), `todo` (a u32 a brick), the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D
+//! r16unorm), only in bricks to do. Cost a voxel and direction: one read of V_o (for n pieces 4 to 8 more each), one segment,
+//! two compositions, one read and write of V_AO, whatever the radius.
+//!
+//! Directions are summed in a fixed order, each contribution rounded to 1/65535 once, and full and partial updates run this one
+//! module: so they agree bit for bit.
+
+use super::field::Field;
+use crate::gpu::{Bind, Buffer, Gpu, Image, Pipeline, Recorder, shaders};
+use crate::lattice::{LatticeRay, LatticeRays};
+use crate::layout_check;
+use crate::occlusion::{Occlusion, Quadrature};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    axis: u32,
+    step: [i32; 3],
+    window: u32,
+    bricks: [u32; 3],
+    flags: u32,
+    tiles: [u32; 2],
+    list: u32,
+    pieces: u32,
+    depth: f32,
+    start: f32,
+    far: f32,
+    share: f32,
+}
+layout_check!(Params => shaders::sweep::SWEEP_PARAMS {
+    dims, axis, step, window, bricks, flags, tiles, list, pieces, depth, start, far, share
+});
+
+/// Longest window of the kernel, in segments.
+const MOST_SEGMENTS: u32 = 128;
+/// Edge of a tile of lines, as the kernels have it.
+const TILE: u32 = 8;
+/// Segments of a chunk, as the kernels have it.
+const CHUNK: u32 = 8;
+
+/// One direction and its reverse as the kernels walk them.
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    /// The lattice direction, its last component that is not 0 positive; the weight is that of each of the two.
+    pub ray: LatticeRay,
+    /// Axis along which lines are walked: one of stride 1 where there is one, x last, so that lanes lie along x.
+    pub axis: usize,
+    /// Segments of a window, behind the first of a ray: W − 1, at least 1.
+    pub window: u32,
+    /// Segments of a ray, W.
+    pub segments: u32,
+    /// Pieces of a segment.
+    pub pieces: u32,
+    /// Length of a segment in mm.
+    pub length_mm: f64,
+    /// Tiles of 8x8 lines across the walk.
+    pub tiles: [u32; 2],
+    /// Most runs that the list can hold for it.
+    pub runs: u32,
+}
+
+impl Walk {
+    /// Tiles in all layers.
+    pub fn tile_count(&self) -> u32 {
+        self.tiles[0] * self.tiles[1] * self.ray.step[self.axis].unsigned_abs()
+    }
+}
+
+/// A sweep: its directions in the order of summation, each with its reverse, and its settings.
+#[derive(Clone, Debug)]
+pub struct SweepPlan {
+    /// The directions.
+    pub walks: Vec<Walk>,
+    /// How far the weights are from integrating the sphere, see [`LatticeRays`].
+    pub residual: f64,
+    /// Start of the rays in mm.
+    pub offset_mm: f64,
+    /// How far in mm a change of opacity reaches.
+    pub reach_mm: f64,
+}
+
+impl SweepPlan {
+    /// The plan of these settings.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for another quadrature than the segment rule and for an offset beyond the first segment,
+    /// [`Error::Limit`] for a radius of more segments than a block holds.
+    pub fn new(dims: [u32; 3], spacing: [f64; 3], occlusion: &Occlusion) -> Result<Self> {
+        if occlusion.quadrature != Quadrature::Segment {
+            return Err(Error::Config {
+                what: "quadrature".into(),
+                problem: format!(
+                    "a sweep integrates by the rule `segment`, not `{}`; choose that, or method lao or cao",
+                    occlusion.quadrature.name()
+                ),
+            });
+        }
+        let smallest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        let offset_mm = f64::from(occlusion.lattice_offset(smallest));
+        let radius_mm = f64::from(occlusion.radius_mm);
+        let rays = LatticeRays::new(occlusion.rays, spacing);
+        if radius_mm == 0.0 {
+            return Ok(Self { walks: Vec::new(), residual: rays.residual, offset_mm, reach_mm: 0.0 });
+        }
+        let mut walks = Vec::new();
+        let mut reach_mm: f64 = 0.0;
+        // Sets are symmetric: the other half are the reverses, of equal weight.
+        let forward = |ray: &LatticeRay| ray.step.into_iter().rev().find(|&c| c != 0) > Some(0);
+        for ray in rays.rays.into_iter().filter(forward) {
+            let length_mm = ray.length_mm(spacing);
+            if offset_mm >= length_mm {
+                return Err(Error::Config {
+                    what: "offset_mm".into(),
+                    problem: format!(
+                        "{offset_mm} mm; a sweep's rays start within their first segment, < {length_mm:.3} mm"
+                    ),
+                });
+            }
+            let segments = ray.segments(spacing, radius_mm);
+            if segments - 1 > MOST_SEGMENTS {
+                return Err(Error::Limit {
+                    what: format!("segments of a ray along {:?} for radius {radius_mm} mm", ray.step),
+                    needed: segments.into(),
+                    limit: u64::from(MOST_SEGMENTS) + 1,
+                    hint: "make the radius smaller, or use method lao or cao".into(),
+                });
+            }
+            let pieces = ray.pieces(spacing, f64::from(occlusion.lattice_step(smallest)));
+            // The corners that samples between lattice points interpolate lie beside the ray.
+            let beside = if pieces > 1 { spacing.iter().map(|s| s * s).sum::<f64>().sqrt() } else { 0.0 };
+            reach_mm = reach_mm.max(f64::from(segments) * length_mm + beside);
+            let axis = [2, 1, 0]
+                .into_iter()
+                .filter(|&a| ray.step[a] != 0)
+                .min_by_key(|&a| ray.step[a].unsigned_abs())
+                .unwrap_or(2);
+            let window = (segments - 1).max(1);
+            let across: [usize; 2] = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
+            let tiles = across.map(|a| dims[a].div_ceil(TILE));
+            let stride = ray.step[axis].unsigned_abs();
+            // A run is a chunk with a voxel and `lag` more; between two runs is one at least.
+            let size = window.min(CHUNK);
+            let (chunks, lag) = (dims[axis].div_ceil(stride).div_ceil(size), window / size + 1);
+            let runs = tiles[0] * tiles[1] * stride * chunks.div_ceil(lag + 2);
+            walks.push(Walk { ray, axis, window, segments, pieces, length_mm, tiles, runs });
+        }
+        Ok(Self { walks, residual: rays.residual, offset_mm, reach_mm })
+    }
+}
+
+/// The kernel `sweep`.
+pub struct Sweep {
+    pipeline: Pipeline,
+    pieces: Pipeline,
+}
+
+impl Sweep {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let build = |entry| gpu.compute(&shaders::sweep::SHADER, entry);
+        Ok(Self { pipeline: build("main")?, pieces: build("pieces")? })
+    }
+
+    /// Adds direction `index` of a plan and its reverse. The first one begins the sum.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        plan: &SweepPlan,
+        index: usize,
+        reference_mm: f32,
+        opacity: &Image,
+        list: &Buffer,
+        todo: &Buffer,
+        ambient: &Image,
+    ) -> Result<()> {
+        let walk = &plan.walks[index];
+        let start = plan.offset_mm / walk.length_mm;
+        let params = Params {
+            dims: field.dims,
+            axis: walk.axis as u32,
+            step: walk.ray.step,
+            window: walk.window,
+            bricks: field.bricks(),
+            flags: u32::from(index == 0),
+            tiles: walk.tiles,
+            list: index as u32,
+            pieces: walk.pieces,
+            depth: (walk.length_mm / f64::from(walk.pieces) / f64::from(reference_mm)) as f32,
+            start: start as f32,
+            far: (walk.segments - 1) as f32,
+            share: (walk.ray.weight / (f64::from(walk.segments) - start)) as f32,
+        };
+        let binds = [
+            ("opacity", Bind::Image(opacity)),
+            ("list", Bind::Buffer(list)),
+            ("todo", Bind::Buffer(todo)),
+            ("ambient", Bind::Image(ambient)),
+        ];
+        let at = super::sweep_list::HEAD_BYTES * index as u64;
+        let pipeline = if walk.pieces > 1 { &self.pieces } else { &self.pipeline };
+        rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), list, at)
+    }
+}
