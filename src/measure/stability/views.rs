@@ -105,7 +105,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         && shifted.largest() <= SAME_RAYS;
     Ok(Finding {
         sentence: format!(
-            "Rays that begin on front faces leave holes from a distance of {} half-edges on ({} % of the block's pixels at the centre), and \
+            "Rays that begin on front faces leave holes at distances of {} half-edges and less ({} % of the block's pixels at the centre), and \
              asymmetric eyes that are taken for symmetric are off by {}; {} {} holes, {nan} NaN, {unequal} of {} equal eyes with other \
              pictures, {} of {} points that the eyes read differently, and asymmetric eyes off by {}.",
             short(first),
