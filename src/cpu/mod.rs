@@ -20,6 +20,7 @@ pub mod raycast;
 pub mod reference;
 pub mod ssao;
 pub mod sweep;
+pub mod sweep_list;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
