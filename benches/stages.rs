@@ -60,6 +60,7 @@ fn stages(criterion: &mut Criterion) {
     let transfer = TransferFunction::load("auto", volume.range()).expect("a preset");
     let gpu = Gpu::open(&OpenOptions::default()).expect("a Vulkan device");
     let mut setup = Setup::paper(volume.min_spacing());
+    setup.method = Method::Cao;
     setup.occlusion.radius_mm = 8.0;
     let renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).expect("a renderer");
     let mut bench = Bench { renderer, turn: 0, transfer, group: criterion.benchmark_group("stages") };
@@ -107,6 +108,17 @@ fn stages(criterion: &mut Criterion) {
     bench.stage("contextual, clip elsewhere", "contextual", |renderer, turn| {
         renderer.set_clips(&[sphere(if turn % 2 == 0 { -8.0 } else { 8.0 })]).expect("a clip");
     });
+
+    let mut swept = Setup { method: Method::Sweep, ..setup };
+    swept.occlusion.quadrature = Quadrature::Segment;
+    swept.occlusion.rays = RaySet::W26;
+    set(&mut bench, swept);
+    bench.stage("sweep 26w", "sweep", |renderer, _| renderer.invalidate());
+    for stage in ["carve", "choose"] {
+        bench.stage(stage, stage, |renderer, turn| {
+            renderer.set_clips(&[sphere(to_and_fro(turn))]).expect("a clip");
+        });
+    }
 
     let views = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 1.0, 1e3).expect("views");
     let renderer = &bench.renderer;
