@@ -140,7 +140,7 @@ fn shape(quadrature: Option<Quadrature>) -> Marker {
 
 /// Equal weights, as in the paper.
 fn hollow(point: &Point) -> bool {
-    point.setting.quadrature.is_some() && !point.setting.label.ends_with('w')
+    point.setting.quadrature.is_some() && !point.setting.label.contains('w')
 }
 
 fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) {
