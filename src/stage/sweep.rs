@@ -24,7 +24,11 @@
 //! | … V_o read in batches of 8 before the arithmetic; the same not unrolled | 12.5; 11.9 |
 //! | … V_o as a sampled texture | 11.9 |
 //! | … chunks of 4 | 12.4 |
-//! | … no guards: this one (R 50: 11.8) | 10.5 |
+//! | … no guards: this one (R 50: 11.8) | 9.8 to 10.5 |
+//! | … arrays of a chunk declared outside the loop, so not cleared for each chunk | 9.9 beside 9.8 |
+//!
+//! So 4.9 to 5.3 ns on two cores, half of what it was. `benches/sweep_simd.rs`, segment rule, W = 20: 1.0 ns with AVX2 and
+//! 0.6 ns with AVX-512 at best on two cores (medians 1.8 and 0.8); the wanted factor of 2 is not reached.
 //!
 //! Of 11.4 ns with guards, what taking a part out saves: pairs of segments 3.9, V_AO 2.9 (`todo` less than 0.4 of it), both
 //! reads of V_o 2.2, heads 2.0, rays backwards and their array 2.0, gaps 0.8, middle and odd segments 0.4. A read of a
