@@ -243,8 +243,8 @@ fn subtract(p: vec3<i32>, occluded: f32) {
     textureStore(ambient, p, vec4(before - occluded, 0.0, 0.0, 0.0));
 }
 
-// One workgroup a run of chunks of a tile of 8x8 lines.
-fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
+// One workgroup a run of chunks of a tile of 8x8 lines. `long`: windows fill a chunk, so that no place of it is asked for.
+fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     let entry = group.x + group.y * GROUPS_PER_ROW;
     if entry >= list.head[params.list].count {
         return;
@@ -258,7 +258,7 @@ fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
     let steps = line_steps(line.z, params.axis, dims, params.step);
     let advance = params.step % dims;
     let window = i32(params.window);
-    let size = chunk_size(window);
+    let size = select(chunk_size(window), CHUNK, long);
     // The middle: so many segments that are the last of their chunk, then so many whole chunks.
     let whole = (window - size) / size;
     let odd = window - size - whole * size;
@@ -290,7 +290,7 @@ fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
         if c >= first {
             var links: array<Link, CHUNK>;
             for (var i = 0; i < CHUNK; i++) {
-                if i < size {
+                if long || i < size {
                     let next = step_from(trail.p, advance);
                     let to = point(next.p);
                     let found = segment(fine, trail, to, next.gap);
@@ -302,7 +302,7 @@ fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
             var suffix = NOTHING;
             for (var k = 0; k < CHUNK; k++) {
                 let i = CHUNK - 1 - k;
-                if i < size {
+                if long || i < size {
                     let length = f32(size - 1 - i);
                     let head = suffixes[i];
                     suffixes[i] = vec3(
@@ -323,7 +323,7 @@ fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
         var chunk = NOTHING;
         var last = NOTHING;
         for (var i = 0; i < CHUNK; i++) {
-            if i < size {
+            if long || i < size {
                 let next = step_from(lead.p, advance);
                 let to = point(next.p);
                 let found = segment(fine, lead, to, next.gap);
@@ -356,11 +356,17 @@ fn walk(fine: bool, group: vec3<u32>, local: vec3<u32>) {
 
 @compute @workgroup_size(8, 8, 1)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    walk(false, group, local);
+    walk(false, true, group, local);
+}
+
+// Windows shorter than a chunk.
+@compute @workgroup_size(8, 8, 1)
+fn short(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    walk(false, false, group, local);
 }
 
 // Segments of more than one piece.
 @compute @workgroup_size(8, 8, 1)
 fn pieces(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    walk(true, group, local);
+    walk(true, false, group, local);
 }

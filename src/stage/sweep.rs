@@ -2,12 +2,37 @@
 //! `A_k(x) = S_k / (W − o/|v|)` with `(t, S) = head ∘ suffix ∘ prefix` of affine pairs, summed as
 //! `V_AO(x) = 1 − Σ_k w_k (1 − A_k(x))`, equal to evaluating each window directly ([`crate::cpu::sweep`]) up to rounding.
 //!
-//! In: `opacity` V_o (3D r16unorm), `todo` (a u32 a brick), the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D
-//! r16unorm), only in bricks to do. Cost a voxel and direction: one read of V_o (for n pieces 4 to 8 more each), one segment,
-//! two compositions, one read and write of V_AO, whatever the radius.
+//! A line and its reverse are walked together and added at once. In: `opacity` V_o (3D r16unorm, read as a storage image),
+//! `todo` (a u32 a brick), the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D r16unorm), only in bricks to do. Cost a voxel
+//! and line, that is for two directions: two reads of V_o (for n pieces 4 to 8 more each), two segments, four compositions, one
+//! read and write of V_AO; for R/8 segments one composition more in eight voxels.
 //!
-//! Directions are summed in a fixed order, each contribution rounded to 1/65535 once, and full and partial updates run this one
-//! module: so they agree bit for bit.
+//! Directions are summed in a fixed order, each line's contribution rounded to 1/65535 once, and full and partial updates run
+//! the same entry point of this one module: so they agree bit for bit.
+//!
+//! Variants tried, in ns of processor time a voxel and direction, least of 2 or 3 (AMD EPYC, 2 cores, llvmpipe of Mesa
+//! 25.0.7, LLVM 15, 256 bit; 128³ gyroid, 26w, one piece, R 20 unless said, other work on the machine, so ± 5 %):
+//!
+//! | variant | ns |
+//! |---|---|
+//! | one direction at a time, blocks of a window in a private array, sampled V_o (R 50: 22.0) | 19.3 |
+//! | … compiled for one piece | 16.2 |
+//! | … and without the heads (wrong), to see their cost | 14.4 |
+//! | … for one piece, no `todo` / nor reading V_AO / nor array beyond 24 (the last two wrong for others) | 15.4 / 14.9 / 14.6 |
+//! | line and reverse, chunks of 8 in registers, guards for short windows (R 50: 13.3) | 11.7 |
+//! | … loops not unrolled | 13.6 |
+//! | … V_o read in batches of 8 before the arithmetic; the same not unrolled | 12.5; 11.9 |
+//! | … V_o as a sampled texture | 11.9 |
+//! | … chunks of 4 | 12.4 |
+//! | … no guards: this one (R 50: 11.8) | 9.8 to 10.5 |
+//! | … arrays of a chunk declared outside the loop, so not cleared for each chunk | 9.9 beside 9.8 |
+//!
+//! So 4.9 to 5.3 ns on two cores, half of what it was. `benches/sweep_simd.rs`, segment rule, W = 20: 1.0 ns with AVX2 and
+//! 0.6 ns with AVX-512 at best on two cores (medians 1.8 and 0.8); the wanted factor of 2 is not reached.
+//!
+//! Of 11.4 ns with guards, what taking a part out saves: pairs of segments 3.9, V_AO 2.9 (`todo` less than 0.4 of it), both
+//! reads of V_o 2.2, heads 2.0, rays backwards and their array 2.0, gaps 0.8, middle and odd segments 0.4. A read of a
+//! storage image takes 0.7 to 0.9 ns alone, of a sampled one 1.4 to 1.7, `log` 0.34, `exp` 0.25, a division 0.06.
 
 use super::field::Field;
 use crate::gpu::{Bind, Buffer, Gpu, Image, Pipeline, Recorder, shaders};
@@ -158,6 +183,7 @@ impl SweepPlan {
 /// The kernel `sweep`.
 pub struct Sweep {
     pipeline: Pipeline,
+    short: Pipeline,
     pieces: Pipeline,
 }
 
@@ -165,7 +191,7 @@ impl Sweep {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let build = |entry| gpu.compute(&shaders::sweep::SHADER, entry);
-        Ok(Self { pipeline: build("main")?, pieces: build("pieces")? })
+        Ok(Self { pipeline: build("main")?, short: build("short")?, pieces: build("pieces")? })
     }
 
     /// Adds direction `index` of a plan and its reverse. The first one begins the sum.
@@ -206,7 +232,12 @@ impl Sweep {
             ("ambient", Bind::Image(ambient)),
         ];
         let at = super::sweep_list::HEAD_BYTES * index as u64;
-        let pipeline = if walk.pieces > 1 { &self.pieces } else { &self.pipeline };
+        // By the plan alone, so that full and partial updates run the same code.
+        let pipeline = match walk.pieces {
+            2.. => &self.pieces,
+            _ if walk.window < CHUNK => &self.short,
+            _ => &self.pipeline,
+        };
         rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), list, at)
     }
 }
