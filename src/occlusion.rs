@@ -186,10 +186,15 @@ impl Occlusion {
         self.offset_mm.unwrap_or((0.5 * min_spacing) as f32)
     }
 
-    /// Largest distance in mm between samples of a lattice ray; by default every segment of a 26-set is one piece, √3
-    /// voxels long at most, and the longer ones of other sets have two (method.md §4).
+    /// Largest distance in mm between samples of a lattice ray (method.md §4); by default every segment of the sets of up to 26
+    /// is one piece, √3 voxels long at most, where more pieces cost twice as much and gain little, and the segments of the larger
+    /// sets have samples up to 1.45 voxels apart, which takes a third off their error.
     pub fn lattice_step(&self, min_spacing: f64) -> f32 {
-        self.step_mm.unwrap_or((1.75 * min_spacing) as f32)
+        let voxels = match self.rays {
+            RaySet::W50 | RaySet::R54 => 1.45,
+            _ => 1.75,
+        };
+        self.step_mm.unwrap_or((voxels * min_spacing) as f32)
     }
 
     /// Most samples of one ray; more has no use at any volume's size that a device holds.

@@ -25,7 +25,7 @@
 //!     quadrature = "segment"           # left cell segment; sweeps: segment; default of cao and lao: left, the paper's sum
 //!     radius_mm = 20                   # default: 20 of the smallest spacing
 //!     offset_mm = 0.5                  # where rays start; default: half a step
-//!     step_mm = 1                      # default: the smallest spacing; of sweeps 1.75 times that, at most
+//!     step_mm = 1                      # default: the smallest spacing; of sweeps 1.75 (50w, 54: 1.45) times that, at most
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]

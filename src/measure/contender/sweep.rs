@@ -8,7 +8,7 @@ use crate::scene::Method;
 /// Cost of a direction in rays cast from every voxel: what a sweep saves.
 const RAY: f64 = 0.01;
 
-/// Every ray set with exact weights; those of 50 also with a sample every voxel and a half.
+/// Every ray set with exact weights; two of them also with finer samples.
 pub fn entries(asked: &Asked) -> Vec<Entry> {
     let paper = Setup::paper(asked.min_spacing);
     let voxel = asked.min_spacing as f32;
