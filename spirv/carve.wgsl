@@ -16,6 +16,8 @@ struct CarveParams {
     levels: f32,
     slope: f32,
     bias: f32,
+    // changed bricks whose former opacity is kept
+    capacity: u32,
 }
 
 struct Occupancy {
@@ -33,12 +35,22 @@ struct Change {
     distance: array<f32>,
 }
 
+struct Todo {
+    // as in shared/bricks.wgsl; only octants that changed here
+    brick: array<u32>,
+}
+
 struct GrowingList {
     groups_x: atomic<u32>,
     groups_y: atomic<u32>,
     groups_z: u32,
     count: atomic<u32>,
     items: array<u32>,
+}
+
+// Opacities that changed bricks had: for each of the 256 invocations of a brick those of its two slices, in 65535ths.
+struct Past {
+    opacities: array<u32>,
 }
 
 #include "shared/bricks.wgsl"
@@ -57,6 +69,9 @@ var<immediate> params: CarveParams;
 @group(0) @binding(10) var<storage, read_write> growing: GrowingList;
 @group(0) @binding(11) var<storage, read> list: BrickList;
 @group(0) @binding(12) var opacity: texture_storage_3d<r16unorm, read_write>;
+@group(0) @binding(13) var<storage, read_write> changed: GrowingList;
+@group(0) @binding(14) var<storage, read_write> past: Past;
+@group(0) @binding(15) var<storage, read_write> todo: Todo;
 
 #include "shared/clip_opacity.wgsl"
 
@@ -105,7 +120,10 @@ fn contact_of(local: vec3<u32>) -> u32 {
 }
 
 var<workgroup> found: atomic<u32>;
+// Octants.
 var<workgroup> different: atomic<u32>;
+// Where the brick is in the list of changed ones.
+var<workgroup> place: u32;
 
 // One workgroup a brick; each invocation takes two slices.
 @compute @workgroup_size(8, 8, 4)
@@ -124,6 +142,7 @@ fn main(
         atomicStore(&different, 0u);
     }
     workgroupBarrier();
+    var before = array<u32, 2>(0u, 0u);
     for (var slice = 0u; slice < 8u; slice += 4u) {
         let inside = local + vec3(0u, 0u, slice);
         let voxel = brick_at(index, bricks) * 8u + inside;
@@ -134,10 +153,12 @@ fn main(
                 value *= visible_share(code, centre, 0.5 * params.spacing, params.extra_samples);
             }
             let now = u32(round(value * 65535.0));
-            let before = u32(round(textureLoad(opacity, voxel).r * 65535.0));
-            if now != before {
+            let stored = u32(round(textureLoad(opacity, voxel).r * 65535.0));
+            before[slice / 4u] = stored;
+            if now != stored {
                 textureStore(opacity, voxel, vec4(f32(now) / 65535.0, 0.0, 0.0, 0.0));
-                atomicStore(&different, 1u);
+                let octant = inside / 4u;
+                atomicOr(&different, CHANGED << (octant.x + 2u * octant.y + 4u * octant.z));
             }
             if now > 0u {
                 atomicOr(&found, contact_of(inside));
@@ -145,10 +166,24 @@ fn main(
         }
     }
     workgroupBarrier();
-    if lane == 0u && listed {
-        contact.bits[index] = atomicLoad(&found);
-        if atomicLoad(&different) == 1u {
-            change.distance[index] = 0.0;
+    if lane == 0u {
+        place = params.capacity;
+        if listed {
+            contact.bits[index] = atomicLoad(&found);
+            if atomicLoad(&different) != 0u {
+                change.distance[index] = 0.0;
+                todo.brick[index] = atomicLoad(&different);
+                place = atomicAdd(&changed.count, 1u);
+            }
         }
+        if place < params.capacity {
+            changed.items[place] = index;
+            atomicMax(&changed.groups_x, min(place + 1u, GROUPS_PER_ROW));
+            atomicMax(&changed.groups_y, place / GROUPS_PER_ROW + 1u);
+        }
+    }
+    workgroupBarrier();
+    if place < params.capacity {
+        past.opacities[place * 256u + lane] = before[0] | before[1] << 16u;
     }
 }

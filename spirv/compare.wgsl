@@ -45,7 +45,7 @@ fn category_of(voxel: vec3<u32>) -> u32 {
     }
     let brick = voxel / 8u;
     let listed = todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
-    return select(UNTOUCHED, AFFECTED, listed == 1u);
+    return select(UNTOUCHED, AFFECTED, (listed & TODO) != 0u);
 }
 
 fn compare(voxel: vec3<u32>) {

@@ -12,6 +12,10 @@ struct NearParams {
     reach: f32,
     // 1: voxels that no sample with opacity interpolates get a value too
     unneeded: u32,
+    // 1: no value counts any more
+    anew: u32,
+    // bricks whose former opacity is kept
+    capacity: u32,
 }
 
 struct Distance {
@@ -28,8 +32,24 @@ struct Todo {
 }
 
 struct Count {
+    // to do
     bricks: atomic<u32>,
+    // bounds of the bricks to compute anew, x, y, z, and of those that changed
+    low: array<atomic<u32>, 6>,
+    high: array<atomic<u32>, 6>,
 }
+
+// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
+struct Solid {
+    bits: array<u32>,
+}
+
+// Bricks that have values.
+struct Valued {
+    brick: array<u32>,
+}
+
+#include "shared/bricks.wgsl"
 
 var<immediate> params: NearParams;
 @group(0) @binding(0) var<storage, read> before: Distance;
@@ -37,10 +57,9 @@ var<immediate> params: NearParams;
 @group(0) @binding(2) var<storage, read> contact: Contact;
 @group(0) @binding(3) var<storage, read_write> todo: Todo;
 @group(0) @binding(4) var<storage, read_write> count: Count;
-
-fn brick_of(index: u32) -> vec3<u32> {
-    return vec3(index % params.bricks.x, index / params.bricks.x % params.bricks.y, index / (params.bricks.x * params.bricks.y));
-}
+@group(0) @binding(5) var<storage, read_write> solid: Solid;
+@group(0) @binding(6) var<storage, read_write> valued: Valued;
+@group(0) @binding(7) var<storage, read> changed: BrickList;
 
 // One invocation a brick.
 @compute @workgroup_size(64)
@@ -49,7 +68,7 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     if index >= params.bricks.x * params.bricks.y * params.bricks.z {
         return;
     }
-    let here = i32(brick_of(index)[params.axis]);
+    let here = i32(brick_at(index, params.bricks)[params.axis]);
     let size = i32(params.bricks[params.axis]);
     let stride = vec3(1u, params.bricks.x, params.bricks.x * params.bricks.y)[params.axis];
     let edge = params.spacing[params.axis];
@@ -64,6 +83,13 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     after.squared[index] = least;
 }
 
+fn bound(brick: vec3<u32>, first: u32) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        atomicMin(&count.low[first + axis], brick[axis]);
+        atomicMax(&count.high[first + axis], brick[axis]);
+    }
+}
+
 // One invocation a brick.
 @compute @workgroup_size(64)
 fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
@@ -71,23 +97,43 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     if index >= params.bricks.x * params.bricks.y * params.bricks.z {
         return;
     }
-    var chosen = 0u;
-    if before.squared[index] <= params.reach * params.reach {
-        chosen = params.unneeded;
-        // The brick's own opacity, or a neighbour's that touches it.
-        let middle = vec3<i32>(brick_of(index));
-        for (var n = 0; n < 27; n++) {
-            let beside = vec3(n % 3, n / 3 % 3, n / 9) - 1;
-            let place = middle + beside;
-            if all(place >= vec3(0)) && all(place < vec3<i32>(params.bricks)) {
-                let at = vec3<u32>(place);
-                let bits = contact.bits[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
-                chosen |= bits >> u32(26 - n) & 1u;
+    let own = brick_at(index, params.bricks);
+    var bits = 0u;
+    for (var n = 0u; n < 8u; n++) {
+        let beside = vec3(n & 1u, n >> 1u & 1u, n >> 2u);
+        let at = own + beside;
+        if all(at < params.bricks) && contact.bits[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x] != 0u {
+            // Every subset of axes that contains this one's.
+            for (var s = n; s < 8u; s++) {
+                bits |= select(0u, 1u << s, (s & n) == n);
             }
         }
     }
-    todo.brick[index] = chosen;
-    if chosen == 1u {
-        atomicAdd(&count.bricks, 1u);
+    solid.bits[index] = bits;
+    var needed = params.unneeded;
+    // The brick's own opacity, or a neighbour's that touches it.
+    for (var n = 0; n < 27; n++) {
+        let place = vec3<i32>(own) + vec3(n % 3, n / 3 % 3, n / 9) - 1;
+        if all(place >= vec3(0)) && all(place < vec3<i32>(params.bricks)) {
+            let at = vec3<u32>(place);
+            let bits = contact.bits[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
+            needed |= bits >> u32(26 - n) & 1u;
+        }
     }
+    // Octants that changed, by carve.wgsl.
+    var word = todo.brick[index] & ALL_CHANGED;
+    if needed == 1u && before.squared[index] <= params.reach * params.reach {
+        // A value that is not there, or opacities that are not, cannot be amended.
+        let anew = params.anew == 1u || valued.brick[index] == 0u || changed.count > params.capacity;
+        word |= select(TODO, TODO | ANEW, anew);
+        atomicAdd(&count.bricks, 1u);
+        if anew {
+            bound(own, 0u);
+        }
+    }
+    if (word & ALL_CHANGED) != 0u {
+        bound(own, 3u);
+    }
+    todo.brick[index] = word;
+    valued.brick[index] = needed;
 }

@@ -22,7 +22,7 @@ struct SweepParams {
     // segments behind the first, at least 1
     window: u32,
     bricks: vec3<u32>,
-    // 1: the first direction, which begins the sum
+    // FIRST, AMEND, ADD
     flags: u32,
     // tiles of lines along the other two axes
     tiles: vec2<u32>,
@@ -36,7 +36,7 @@ struct SweepParams {
     start: f32,
     // segments behind the first: `window`, or 0
     far: f32,
-    // weight of the direction / length of the ray in segments
+    // weight of a direction in 65535ths / length of the ray in segments
     share: f32,
 }
 
@@ -44,10 +44,21 @@ struct Todo {
     brick: array<u32>,
 }
 
+// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
+struct Solid {
+    bits: array<u32>,
+}
+
+#include "shared/bricks.wgsl"
 #include "shared/segment.wgsl"
 #include "shared/sweep.wgsl"
 
+// The first direction, which begins the sum.
 const FIRST = 1u;
+// Only the rays that meet a changed brick, of bricks that have a value; those of bricks to compute anew otherwise.
+const AMEND = 2u;
+// Contributions are taken back, not made.
+const ADD = 4u;
 // Longest window.
 const MOST = 128u;
 // Both ends opaque: nothing comes through (lao.wgsl).
@@ -59,6 +70,7 @@ var<immediate> params: SweepParams;
 @group(0) @binding(1) var<storage, read> list: SweepList;
 @group(0) @binding(2) var<storage, read> todo: Todo;
 @group(0) @binding(3) var ambient: texture_storage_3d<r16unorm, read_write>;
+@group(0) @binding(4) var<storage, read> solid: Solid;
 
 // Transmittance q and ln q.
 const FREE = vec2(1.0, 0.0);
@@ -180,6 +192,7 @@ fn join(a: Link, a_length: f32, b: Link, b_length: f32) -> Link {
     );
 }
 
+const FREE_LINK = Link(1.0, 1.0, 0.0, 1.0, 0.0);
 const NOTHING = Link(1.0, 0.0, 0.0, 0.0, 0.0);
 
 struct Point {
@@ -231,19 +244,50 @@ fn step_from(p: vec3<i32>, advance: vec3<i32>) -> Step {
     return Step(next - select(vec3(0), select(dims, -dims, params.step < vec3(0)), left), gap);
 }
 
-fn subtract(p: vec3<i32>, occluded: f32) {
-    let brick = vec3<u32>(p) / 8u;
-    if todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x] == 0u {
-        return;
-    }
-    var before = 1.0;
-    if (params.flags & FIRST) == 0u {
-        before = textureLoad(ambient, p).r;
-    }
-    textureStore(ambient, p, vec4(before - occluded, 0.0, 0.0, 0.0));
+// A ray's contribution in 65535ths, whole so that the sum is exact in any order and can be taken back.
+fn occluded(unobstructed: f32, sum: f32) -> f32 {
+    return round(params.share * max(unobstructed - sum, 0.0));
 }
 
-// One workgroup a run of chunks of a tile of 8x8 lines. `long`: windows fill a chunk, so that no place of it is asked for.
+fn subtract(p: vec3<i32>, parts: f32) {
+    if parts == 0.0 && (params.flags & FIRST) == 0u {
+        return;
+    }
+    let brick = vec3<u32>(p) / 8u;
+    let word = todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+    if (word & (TODO | ANEW)) != select(TODO | ANEW, TODO, (params.flags & AMEND) != 0u) {
+        return;
+    }
+    var before = 65535.0;
+    if (params.flags & FIRST) == 0u {
+        before = round(65535.0 * textureLoad(ambient, p).r);
+    }
+    textureStore(ambient, p, vec4((before - parts) / 65535.0, 0.0, 0.0, 0.0));
+}
+
+// Whether the next `size` segments from p stay inside the volume and meet no brick with opacity.
+fn free_from(p: vec3<i32>, size: i32) -> bool {
+    let most = max(max(abs(params.step.x), abs(params.step.y)), abs(params.step.z));
+    // So many segments pass one border of bricks on each axis at most.
+    let part = 8 / most;
+    var solid_bits = 0u;
+    for (var i = 0; i < size; i += part) {
+        let a = p + i * params.step;
+        let b = p + min(i + part, size) * params.step;
+        let low = min(a, b);
+        let high = max(a, b);
+        if any(low < vec3(0)) || any(high >= vec3<i32>(params.dims)) {
+            return false;
+        }
+        let brick = vec3<u32>(low) / 8u;
+        let passed = vec3<u32>(high) / 8u - brick;
+        let bits = solid.bits[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+        solid_bits |= bits >> (passed.x + 2u * passed.y + 4u * passed.z);
+    }
+    return (solid_bits & 1u) == 0u;
+}
+
+// One workgroup a run of chunks of a tile of 8x4 lines. `long`: windows fill a chunk, so that no place of it is asked for.
 fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     let entry = group.x + group.y * GROUPS_PER_ROW;
     if entry >= list.head[params.list].count {
@@ -265,7 +309,9 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     let middle_length = f32(window - size);
     // 0 where a ray is its head only.
     let goes_on = min(params.far, 1.0);
-    let unobstructed = 2.0 * (params.far + 1.0 - params.start);
+    let unobstructed = params.far + 1.0 - params.start;
+    let amends = (params.flags & AMEND) != 0u;
+    let sign = select(1.0, -1.0, (params.flags & ADD) != 0u);
 
     let first = i32(run.first) - chunk_lag(window);
     let end = first + i32(run.count);
@@ -275,7 +321,7 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     // Of the last 16 chunks of `lead`: all, and the `odd` last segments.
     var chunks: array<Link, 16>;
     var odds: array<Link, 16>;
-    // Sums of rays backwards, until their voxels have those forwards.
+    // Contributions of rays backwards, until their voxels have those forwards.
     var backwards: array<f32, MOST + 1>;
     var place = 0;
 
@@ -289,14 +335,22 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
         var middle = odds[u32(c - whole - 1) % 16u];
         if c >= first {
             var links: array<Link, CHUNK>;
-            for (var i = 0; i < CHUNK; i++) {
-                if long || i < size {
-                    let next = step_from(trail.p, advance);
-                    let to = point(next.p);
-                    let found = segment(fine, trail, to, next.gap);
-                    links[i] = found.link;
-                    suffixes[i] = found.head * vec3(goes_on, 1.0, goes_on);
-                    trail = to;
+            if free_from(trail.p, size) {
+                for (var i = 0; i < CHUNK; i++) {
+                    links[i] = FREE_LINK;
+                    suffixes[i] = vec3(goes_on, 1.0 - params.start, 0.0);
+                }
+                trail = Point(trail.p + size * params.step, FREE);
+            } else {
+                for (var i = 0; i < CHUNK; i++) {
+                    if long || i < size {
+                        let next = step_from(trail.p, advance);
+                        let to = point(next.p);
+                        let found = segment(fine, trail, to, next.gap);
+                        links[i] = found.link;
+                        suffixes[i] = found.head * vec3(goes_on, 1.0, goes_on);
+                        trail = to;
+                    }
                 }
             }
             var suffix = NOTHING;
@@ -322,30 +376,59 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
         }
         var chunk = NOTHING;
         var last = NOTHING;
+        var ahead = lead.p;
+        var lead_links: array<Link, CHUNK>;
+        var lead_heads: array<vec3<f32>, CHUNK>;
+        if free_from(lead.p, size) {
+            for (var i = 0; i < CHUNK; i++) {
+                lead_links[i] = FREE_LINK;
+                lead_heads[i] = vec3(1.0, 1.0 - params.start, 0.0);
+            }
+            lead = Point(lead.p + size * params.step, FREE);
+        } else {
+            for (var i = 0; i < CHUNK; i++) {
+                if long || i < size {
+                    let next = step_from(lead.p, advance);
+                    let to = point(next.p);
+                    let found = segment(fine, lead, to, next.gap);
+                    lead_links[i] = found.link;
+                    lead_heads[i] = found.head_back;
+                    lead = to;
+                }
+            }
+        }
         for (var i = 0; i < CHUNK; i++) {
             if long || i < size {
-                let next = step_from(lead.p, advance);
-                let to = point(next.p);
-                let found = segment(fine, lead, to, next.gap);
-                lead = to;
-                let head = found.head_back;
+                let head = lead_heads[i];
+                let link = lead_links[i];
                 let rest = middle.s_back + middle.t * suffixes_back[i] + middle.free_back * f32(size - i);
                 let back = head.y + head.x * goes_on * rest + head.z * params.far;
-                middle = join(middle, middle_length + f32(i), found.link, 1.0);
-                chunk = join(chunk, f32(i), found.link, 1.0);
+                middle = join(middle, middle_length + f32(i), link, 1.0);
+                chunk = join(chunk, f32(i), link, 1.0);
                 if i >= size - odd {
-                    last = join(last, f32(i - (size - odd)), found.link, 1.0);
+                    last = join(last, f32(i - (size - odd)), link, 1.0);
                 }
                 if c >= first {
                     let suffix = suffixes[i];
                     let sum = suffix.y + suffix.x * middle.s + suffix.z * (middle_length + f32(i + 1));
                     let at = c * size + i;
+                    var parts = sign * occluded(unobstructed, sum);
+                    let parts_back = sign * occluded(unobstructed, back);
+                    if amends {
+                        ahead = step_from(ahead, advance).p;
+                        let at_back = at + window + 1;
+                        if at_back >= 0 && at_back < steps {
+                            subtract(ahead, parts_back);
+                        }
+                    } else {
+                        parts += backwards[place];
+                        backwards[place] = parts_back;
+                        place = select(place + 1, 0, place == window);
+                    }
                     if at >= 0 && at < steps {
-                        subtract(voxel, max(params.share * (unobstructed - sum - backwards[place]), 0.0));
+                        subtract(voxel, parts);
                     }
                     voxel = step_from(voxel, advance).p;
-                    backwards[place] = back;
-                    place = select(place + 1, 0, place == window);
                 }
             }
         }
@@ -354,19 +437,19 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     }
 }
 
-@compute @workgroup_size(8, 8, 1)
+@compute @workgroup_size(8, 4, 1)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(false, true, group, local);
 }
 
 // Windows shorter than a chunk.
-@compute @workgroup_size(8, 8, 1)
+@compute @workgroup_size(8, 4, 1)
 fn short(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(false, false, group, local);
 }
 
 // Segments of more than one piece.
-@compute @workgroup_size(8, 8, 1)
+@compute @workgroup_size(8, 4, 1)
 fn pieces(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(true, false, group, local);
 }

@@ -78,7 +78,32 @@ impl LatticeRays {
     }
 }
 
+impl LatticeRays {
+    /// The weights as whole 65535ths, equal for a ray and its reverse, that sum to 65534: sums of them, as 16-bit texels hold them,
+    /// are exact in any order and never below 0. The largest remainders are rounded up; what is missing to 65535 is
+    /// never occluded.
+    pub fn parts(&self) -> Vec<u32> {
+        let exact = |ray: &LatticeRay| ray.weight * 65535.0;
+        let mut parts: Vec<u32> = self.rays.iter().map(|ray| exact(ray) as u32).collect();
+        let mut pairs: Vec<usize> = (0..parts.len()).filter(|&i| self.rays[i].forward()).collect();
+        let left = (65534 - parts.iter().sum::<u32>()) / 2;
+        pairs.sort_by(|&a, &b| exact(&self.rays[b]).fract().total_cmp(&exact(&self.rays[a]).fract()));
+        for i in pairs.into_iter().take(left as usize) {
+            let reverse = self.rays[i].step.map(|c| -c);
+            parts.iter_mut().zip(&self.rays).for_each(|(part, ray)| {
+                *part += u32::from(ray.step == self.rays[i].step || ray.step == reverse);
+            });
+        }
+        parts
+    }
+}
+
 impl LatticeRay {
+    /// Whether its last component that is not 0 is positive. Sets are symmetric: the others are the reverses of these.
+    pub fn forward(&self) -> bool {
+        self.step.into_iter().rev().find(|&c| c != 0) > Some(0)
+    }
+
     /// Length of a step in mm.
     pub fn length_mm(&self, spacing: [f64; 3]) -> f64 {
         (0..3).map(|i| (f64::from(self.step[i]) * spacing[i]).powi(2)).sum::<f64>().sqrt()
@@ -209,6 +234,22 @@ mod tests {
                     assert!(ray.step.iter().all(|c| c.abs() <= REACH));
                     let back = rays.iter().find(|r| r.step == ray.step.map(|c| -c)).unwrap();
                     assert!((back.weight - ray.weight).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn parts_are_the_weights_and_sum_to_what_a_texel_holds() {
+        for set in RaySet::ALL {
+            for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 1.5], [0.5, 1.0, 3.0]] {
+                let rays = LatticeRays::new(set, spacing);
+                let parts = rays.parts();
+                assert_eq!(parts.iter().sum::<u32>(), 65534, "{} {spacing:?}", set.name());
+                for (ray, part) in rays.rays.iter().zip(&parts) {
+                    assert!((f64::from(*part) - ray.weight * 65535.0).abs() < 1.0, "{ray:?} {part}");
+                    let reverse = rays.rays.iter().position(|r| r.step == ray.step.map(|c| -c)).unwrap();
+                    assert_eq!(parts[reverse], *part);
                 }
             }
         }

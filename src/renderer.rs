@@ -26,6 +26,7 @@ use crate::stage::dilate::Dilate;
 use crate::stage::eyes::{FrameBuffer, Look, check_count};
 use crate::stage::field::{BRICK, Field};
 use crate::stage::lao::Scope;
+use crate::stage::near::TODO;
 use crate::stage::occupancy::Occupancy;
 use crate::stage::opacity::Opacity;
 use crate::stage::peel::Peel;
@@ -233,8 +234,10 @@ impl Renderer {
     /// Changes the transfer function.
     pub fn set_transfer(&mut self, transfer: TransferFunction) -> Result<()> {
         transfer.check()?;
+        // A length of its own changes what every ray sees, even where no opacity changes.
+        let rays = self.stale.rays || transfer.reference_mm != self.transfer.reference_mm;
         self.transfer = transfer;
-        self.stale = Stale { opacity: true, precomputed: true, ambient: true, ..self.stale };
+        self.stale = Stale { opacity: true, precomputed: true, ambient: true, rays };
         Ok(())
     }
 
@@ -787,7 +790,7 @@ impl Renderer {
                 for k in 0..z {
                     for j in 0..y {
                         let row = (k / BRICK * by + j / BRICK) * bx;
-                        mask.extend((0..x).map(|i| 2 - todo[(row + i / BRICK) as usize] as u8));
+                        mask.extend((0..x).map(|i| 2 - (todo[(row + i / BRICK) as usize] & TODO) as u8));
                     }
                 }
                 Ok(mask)

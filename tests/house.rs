@@ -80,9 +80,10 @@ const ONLY_IN: [(&str, &[&str]); 7] = [
 ];
 
 /// Kernels of the measurements: they compute nothing that has an answer of its own, so there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 2] = [
+const WITHOUT_TWIN: [(&str, &str); 3] = [
     ("compare", "counts differing bits of two volumes; tests plant differences and count them"),
     ("consistency", "reads what each eye reads; tests compare it with the volume itself"),
+    ("past", "exchanges two opacities; tests compare both with what the other was"),
 ];
 
 /// Rust files under a folder: path below it, content.

@@ -150,7 +150,7 @@ impl Scene {
                         .collect();
                 }
                 renderer.set_clips(&self.clips).unwrap();
-                format!("{:?}", self.clips)
+                format!("{} clips", self.clips.len())
             }
         }
     }
@@ -232,6 +232,22 @@ fn updates_equal_a_full_sweep_after_any_sequence_of_edits() {
             "{recomputed} of {compared}"
         );
     }
+    close(gpu);
+}
+
+/// The length that opacities are meant for: none of them changes with it, every value does.
+#[test]
+fn another_reference_length_is_an_edit() {
+    let gpu = open();
+    let mut scene = scene(&mut Random::new(64), "engine");
+    let mut renderer = scene.renderer(&gpu);
+    let before = renderer.read_ambient().unwrap();
+    scene.transfer.reference_mm = Some(3.0 * scene.volume.min_spacing() as f32);
+    renderer.set_transfer(scene.transfer.clone()).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let after = renderer.read_ambient().unwrap();
+    assert!(after != before && after == scene.renderer(&gpu).read_ambient().unwrap());
+    drop(renderer);
     close(gpu);
 }
 

@@ -11,6 +11,13 @@ struct BrickList {
 // Largest group count along one axis that every device has.
 const GROUPS_PER_ROW = 65535u;
 
+// What is said of a brick: its values are to be computed or amended; anew, whatever they were; and from here on, a bit for each
+// octant x + 2 y + 4 z, that an opacity in it changed.
+const TODO = 1u;
+const ANEW = 2u;
+const CHANGED = 256u;
+const ALL_CHANGED = 255u * CHANGED;
+
 fn brick_at(index: u32, bricks: vec3<u32>) -> vec3<u32> {
     return vec3(index % bricks.x, index / bricks.x % bricks.y, index / (bricks.x * bricks.y));
 }

@@ -4,9 +4,8 @@
 // begins at. Its step i is at voxel (u + i du, w + i dw, r + i |da|), the first two modulo the volume; walked from the upper
 // end where da < 0.
 
-// Largest group count along one axis that every device has.
-const GROUPS_PER_ROW = 65535u;
-const TILE = 8u;
+// Lines of a tile along the faster axis across the walk and along the other: eight lie side by side in memory.
+const TILE = vec2(8u, 4u);
 // Segments of a chunk, the last window permitting.
 const CHUNK = 8;
 

@@ -28,12 +28,14 @@ pub fn contact(grid: &Grid, opacity: &[u16]) -> Vec<u32> {
     bits
 }
 
-/// Whether any stored opacity of each brick differs.
-pub fn changed(grid: &Grid, before: &[u16], after: &[u16]) -> Vec<bool> {
+/// The octants of each brick in which a stored opacity differs: bit x + 2 y + 4 z.
+pub fn changed(grid: &Grid, before: &[u16], after: &[u16]) -> Vec<u32> {
     let all = bricks(grid);
-    let mut changed = vec![false; all.len()];
+    let mut changed = vec![0; all.len()];
     for i in (0..grid.len()).filter(|&i| before[i] != after[i]) {
-        changed[all.index(grid.voxel(i).map(|c| c / EDGE))] = true;
+        let voxel = grid.voxel(i);
+        let [x, y, z] = voxel.map(|c| c % EDGE / (EDGE / 2));
+        changed[all.index(voxel.map(|c| c / EDGE))] |= 1 << (x + 2 * y + 4 * z);
     }
     changed
 }
@@ -63,6 +65,7 @@ mod tests {
     fn rounding_is_to_the_nearest_and_changes_are_found_in_their_brick() {
         assert_eq!([0.0, 7e-6, 8e-6, 0.5, 1.0].map(stored), [0, 0, 1, 32768, 65535]);
         let changed = changed(&GRID, &with([3, 3, 3]), &with([16, 0, 8]));
-        assert_eq!(changed, [true, false, false, false, false, true]);
+        assert_eq!(changed, [1, 0, 0, 0, 0, 1]);
+        assert_eq!(super::changed(&GRID, &with([12, 3, 7]), &with([8, 4, 7]))[1], 1 << 5 | 1 << 6);
     }
 }

@@ -33,9 +33,37 @@ pub fn near(grid: &Grid, opacity: &[u16], changed: &[bool], reach_mm: f64, unnee
         .collect()
 }
 
+/// For each brick, bit sx + 2 sy + 4 sz: whether a voxel with opacity lies in a brick at (0 … sx, 0 … sy, 0 … sz) from it.
+pub fn solid(grid: &Grid, opacity: &[u16]) -> Vec<u32> {
+    let all = bricks(grid);
+    let mut filled = vec![false; all.len()];
+    for i in (0..grid.len()).filter(|&i| opacity[i] > 0) {
+        filled[all.index(grid.voxel(i).map(|c| c / EDGE))] = true;
+    }
+    let any = |brick: [usize; 3], reach: usize| {
+        (0..all.len()).any(|other| {
+            let at = all.voxel(other);
+            let within = |axis: usize| (brick[axis]..=brick[axis] + (reach >> axis & 1)).contains(&at[axis]);
+            filled[other] && (0..3).all(within)
+        })
+    };
+    let bits = |i| (0..8).map(|reach| u32::from(any(all.voxel(i), reach)) << reach).sum();
+    (0..all.len()).map(bits).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn solid_bits_reach_upwards_only() {
+        let grid = Grid { dims: [24, 16, 8], spacing: [1.0; 3] };
+        let mut opacity = vec![0; grid.len()];
+        opacity[grid.index([9, 10, 3])] = 1;
+        // Bricks (0,0,0), (1,0,0), (2,0,0), (0,1,0), (1,1,0), (2,1,0).
+        let [x, y, xy] = [0b1010_1010, 0b1100_1100, 0b1000_1000];
+        assert_eq!(solid(&grid, &opacity), [xy, y, 0, x, 0b1111_1111, 0]);
+    }
 
     #[test]
     fn bricks_within_reach_that_need_values_are_chosen() {

@@ -3,10 +3,10 @@
 //! For direction k, a lattice vector v of length |v| in mm, with W = round(R/|v|) segments (at least one) and start offset o:
 //!
 //! ```text
-//! A_k(x) = 1/(W|v| − o) ∫_o^{W|v|} exp(−∫_o^s τ) ds,   A(x) = Σ_k w_k A_k(x)
+//! A_k(x) = 1/(W|v| − o) ∫_o^{W|v|} exp(−∫_o^s τ) ds,   A(x) = 1 − Σ_k w_k (1 − A_k(x))
 //! ```
 //!
-//! Segment j runs from x + jv to x + (j+1)v, in n = ceil(|v|/s_max) pieces; q = 1 − a is the trilinear transmittance at the
+//! with the weights w_k of [`LatticeRays::parts`], whole 65535ths. Segment j runs from x + jv to x + (j+1)v, in n = ceil(|v|/s_max) pieces; q = 1 − a is the trilinear transmittance at the
 //! pieces' ends and linear between them: the exact segment rule of method.md §3. The first piece begins at o. A piece with q
 //! below [`OPAQUE`] at both ends lets nothing through.
 
@@ -34,8 +34,8 @@ fn along(
     }
     let offset = f64::from(occlusion.lattice_offset(grid.min_spacing()));
     let longest = f64::from(occlusion.lattice_step(grid.min_spacing()));
-    let mut ambient = 0.0;
-    for ray in &rays.rays {
+    let mut ambient = 1.0;
+    for (ray, parts) in rays.rays.iter().zip(rays.parts()) {
         let length = ray.length_mm(grid.spacing);
         let pieces = ray.pieces(grid.spacing, longest);
         let segments = ray.segments(grid.spacing, f64::from(occlusion.radius_mm));
@@ -62,7 +62,7 @@ fn along(
             sum += transmittance * (far - begin) * mean_transmittance(depth);
             transmittance *= (-depth).exp();
         }
-        ambient += ray.weight * sum / (f64::from(segments) - start);
+        ambient -= f64::from(parts) / 65535.0 * (1.0 - sum / (f64::from(segments) - start));
     }
     ambient
 }
@@ -97,15 +97,15 @@ mod tests {
                 let occlusion = settings(rays, 6.0);
                 let set = LatticeRays::new(rays, grid.spacing);
                 let tau = -f64::from(1.0 - a).ln() / 2.0;
-                let expected: f64 = set
-                    .rays
-                    .iter()
-                    .map(|ray| {
+                let occluded: f64 = (set.rays.iter().zip(set.parts()))
+                    .map(|(ray, parts)| {
                         let length = ray.length_mm(grid.spacing);
                         let x = tau * (f64::from(ray.segments(grid.spacing, 6.0)) * length - 0.5);
-                        ray.weight * if x == 0.0 { 1.0 } else { (1.0 - (-x).exp()) / x }
+                        let clear = if x == 0.0 { 1.0 } else { (1.0 - (-x).exp()) / x };
+                        f64::from(parts) / 65535.0 * (1.0 - clear)
                     })
                     .sum();
+                let expected = 1.0 - occluded;
                 let found = along(&set, &grid, &vec![a; grid.len()], &occlusion, 2.0, [12, 12, 12]);
                 assert!((found - expected).abs() < 1e-6, "{} a={a}: {found}, {expected}", rays.name());
             }
@@ -122,7 +122,8 @@ mod tests {
         let found = along(&set, &grid, &wall, &settings(RaySet::R6, 6.0), 1.0, [8, 8, 8]);
         // Along +x: free from 0.5 to 3, then q falls from 1 to 0 over one voxel.
         let last = mean_transmittance(1.0);
-        let expected = 5.0 / 6.0 + (2.5 + last) / 5.5 / 6.0;
+        let along_x = set.rays.iter().position(|ray| ray.step == [1, 0, 0]).unwrap();
+        let expected = 1.0 - f64::from(set.parts()[along_x]) / 65535.0 * (1.0 - (2.5 + last) / 5.5);
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
 

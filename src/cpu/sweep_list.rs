@@ -1,13 +1,13 @@
 //! Which chunks of which tiles of lines hold a voxel to compute (method.md §4, sparse sweeps), by asking every voxel.
 //!
 //! A voxel x lies on the line that began at layer r of the walk's axis, r < |v_a|, and is reached after i steps:
-//! x_a = r + i·|v_a| (from the other end where v_a < 0). Across the walk the line began at x − i·v, modulo the volume. Eight by eight
+//! x_a = r + i·|v_a| (from the other end where v_a < 0). Across the walk the line began at x − i·v, modulo the volume. Eight by four
 //! lines of a layer are a tile, `size` steps a chunk.
 
 use std::collections::BTreeSet;
 
-/// Edge of a tile in lines.
-const TILE: usize = 8;
+/// Lines of a tile along the two axes across a walk.
+const TILE: [usize; 2] = [8, 4];
 
 /// Tiles, the first axis across the walk fastest, then the second, then layers; and in them chunks of `size` steps, from a line's
 /// first voxel on.
@@ -33,9 +33,9 @@ pub fn sweep_list(
                 let place = |a: usize| {
                     (voxel[a] as i64 - i as i64 * i64::from(step[a])).rem_euclid(dims[a] as i64) as usize
                 };
-                let tiles = dims[across[0]].div_ceil(TILE);
-                let rows = dims[across[1]].div_ceil(TILE);
-                let tile = (layer * rows + place(across[1]) / TILE) * tiles + place(across[0]) / TILE;
+                let tiles = dims[across[0]].div_ceil(TILE[0]);
+                let rows = dims[across[1]].div_ceil(TILE[1]);
+                let tile = (layer * rows + place(across[1]) / TILE[1]) * tiles + place(across[0]) / TILE[0];
                 found.insert((tile, i / size));
             }
         }
@@ -54,14 +54,14 @@ mod tests {
         // Step 9 along z from (13 + 9, 5) mod (16, 10): place (6, 5).
         assert_eq!(
             sweep_list(dims, [-1, 0, 1], 2, 4, one([13, 5, 9])).into_iter().collect::<Vec<_>>(),
-            [(0, 2)]
+            [(2, 2)]
         );
         // Two layers; 9 is in the second, at step 4; place (9, 5 - 4).
         assert_eq!(
             sweep_list(dims, [0, 1, 2], 2, 4, one([9, 5, 9])).into_iter().collect::<Vec<_>>(),
-            [(5, 1)]
+            [(7, 1)]
         );
         assert!(sweep_list(dims, [1, 0, 0], 0, 8, |_| false).is_empty());
-        assert_eq!(sweep_list(dims, [1, 0, 0], 0, 8, |_| true).len(), 2 * 3 * 2);
+        assert_eq!(sweep_list(dims, [1, 0, 0], 0, 8, |_| true).len(), 2 * 5 * 2);
     }
 }

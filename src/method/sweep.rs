@@ -14,9 +14,10 @@ use crate::stage::clip_bricks::ClipBricks;
 use crate::stage::clips::ClipSet;
 use crate::stage::field::Field;
 use crate::stage::lao::Scope;
-use crate::stage::near::{self, FAR, Near};
-use crate::stage::sweep::{Sweep, SweepPlan};
-use crate::stage::sweep_list::{SweepList, SweepLists};
+use crate::stage::near::{self, ANEW, FAR, Near};
+use crate::stage::past::{Past, PastBricks};
+use crate::stage::sweep::{self, Pass, Sweep, SweepPlan};
+use crate::stage::sweep_list::{self, SweepList, SweepLists};
 use crate::stage::transfer::TransferBuffer;
 use crate::{Error, Result};
 
@@ -30,14 +31,19 @@ pub struct SweptVolumes {
     pub occupancy: Buffer,
     /// Bricks that the last update computed, u32 each.
     pub todo: Buffer,
-    /// Their number, one u32.
-    pub count: Buffer,
+    /// [`near::Chosen`].
+    pub chosen: Buffer,
     /// What the clips do to each brick, u32 each.
     pub clip_bricks: Buffer,
     clip_bricks_before: Buffer,
     contact: Buffer,
     change: Buffer,
     other: Buffer,
+    solid: Buffer,
+    /// As it was when V_AO was computed.
+    solid_before: Buffer,
+    valued: Buffer,
+    past: PastBricks,
     list: BrickList,
     lists: SweepLists,
     plan: SweepPlan,
@@ -65,12 +71,20 @@ impl SweptVolumes {
             ambient: volume_image(gpu, "ambient", field, Format::R16Unorm)?,
             occupancy: brick_buffer("occupancy")?,
             todo: brick_buffer("bricks to do")?,
-            count: gpu.buffer("number of bricks to do", 4, BufferUse::Device)?,
+            chosen: gpu.buffer(
+                "bricks to do, in all",
+                size_of::<near::Chosen>() as u64,
+                BufferUse::Device,
+            )?,
             clip_bricks: ClipBricks::buffer(gpu, field)?,
             clip_bricks_before: ClipBricks::buffer(gpu, field)?,
             contact: brick_buffer("contact")?,
             change: brick_buffer("change")?,
             other: brick_buffer("change, other")?,
+            solid: brick_buffer("solid bricks")?,
+            solid_before: brick_buffer("solid bricks before")?,
+            valued: brick_buffer("bricks with values")?,
+            past: PastBricks::new(gpu, field)?,
             list: BrickList::new(gpu, field)?,
             lists: SweepLists::new(gpu, &plan)?,
             plan,
@@ -82,7 +96,9 @@ impl SweptVolumes {
         rec.barrier(&[], &[Access::TransferWrite]);
         rec.clear_image(&volumes.opacity, [0.0; 4])?;
         rec.clear_image(&volumes.ambient, [1.0; 4])?;
-        for buffer in [&volumes.contact, &volumes.clip_bricks_before, &volumes.todo] {
+        for buffer in
+            [&volumes.contact, &volumes.clip_bricks_before, &volumes.todo, &volumes.solid, &volumes.valued]
+        {
             rec.fill(buffer, 0, bricks, 0)?;
         }
         rec.fill(&volumes.change, 0, bricks, FAR)?;
@@ -118,6 +134,7 @@ pub struct SweepKernels {
     classify: Classify,
     carve: Carve,
     near: Near,
+    past: Past,
     list: SweepList,
     sweep: Sweep,
 }
@@ -130,6 +147,7 @@ impl SweepKernels {
             classify: Classify::new(gpu)?,
             carve: Carve::new(gpu)?,
             near: Near::new(gpu)?,
+            past: Past::new(gpu)?,
             list: SweepList::new(gpu)?,
             sweep: Sweep::new(gpu)?,
         })
@@ -193,21 +211,26 @@ pub fn record_choice(
             contact: &volumes.contact,
             change: &volumes.change,
             list: &volumes.list,
+            todo: &volumes.todo,
+            past: &volumes.past,
             opacity: &volumes.opacity,
         },
     )?;
     rec.end_stage()?;
     rec.barrier(&all_shaders, &[Access::StorageRead, Access::StorageWrite, Access::SampledRead]);
 
-    choose(rec, field, kernels, volumes, &volumes.todo)
+    rec.copy_buffer(&volumes.solid, 0, &volumes.solid_before, 0, volumes.solid.bytes())?;
+    rec.barrier(&[Access::TransferRead, Access::TransferWrite], &all_shaders);
+    choose(rec, field, kernels, volumes, edit.ambient, &volumes.todo)
 }
 
-/// From changed bricks to bricks to do and the runs of lines through them.
+/// From changed bricks to those to amend and those to compute anew.
 fn choose(
     rec: &mut Recorder,
     field: &Field,
     kernels: &SweepKernels,
     volumes: &SweptVolumes,
+    anew: bool,
     todo: &Buffer,
 ) -> Result<()> {
     rec.stage("choose")?;
@@ -216,49 +239,113 @@ fn choose(
         other: &volumes.other,
         contact: &volumes.contact,
         todo,
-        count: &volumes.count,
+        count: &volumes.chosen,
+        solid: &volumes.solid,
+        valued: &volumes.valued,
+        past: &volumes.past,
     };
     // At least to the bricks that a change can give their first voxel that needs a value.
     let reach = volumes.plan.reach_mm.max(f64::from(field.diagonal()));
-    kernels.near.record(rec, field, volumes.scope, reach as f32, bindings)?;
-    kernels.list.record(rec, field, &volumes.plan, todo, &volumes.lists)?;
+    kernels.near.record(rec, field, volumes.scope, reach as f32, anew, bindings)?;
     rec.end_stage()
 }
 
-/// Records one direction of the sweep into `ambient`.
-#[expect(clippy::too_many_arguments, reason = "inputs, outputs and settings, each named once")]
-fn record_direction(
-    rec: &mut Recorder,
-    field: &Field,
-    kernels: &SweepKernels,
-    volumes: &SweptVolumes,
-    direction: usize,
+/// A part of what follows the choice.
+#[derive(Clone, Copy)]
+enum Step {
+    /// The runs of lines to walk.
+    List { amend: bool },
+    /// Former for present opacities and back.
+    Exchange,
+    /// One direction and its reverse.
+    Direction { index: usize, pass: Pass },
+}
+
+/// The stages and their steps: the rays that meet a change are walked through the former and the new opacities, then bricks
+/// without values are swept.
+fn stages(plan: &SweepPlan, anew_only: bool) -> Vec<(&'static str, Vec<Step>)> {
+    let directions = |pass| (0..plan.walks.len()).map(move |index| Step::Direction { index, pass });
+    let mut amend = vec![Step::List { amend: true }, Step::Exchange];
+    amend.extend(directions(Pass::TakeBack));
+    amend.push(Step::Exchange);
+    amend.extend(directions(Pass::Amend));
+    let mut sweep = vec![Step::List { amend: false }];
+    sweep.extend(directions(Pass::Anew));
+    let stages = [("amend", amend), ("sweep", sweep)];
+    stages.into_iter().skip(usize::from(anew_only)).collect()
+}
+
+/// What the steps work on, beside the volumes.
+struct Target<'a> {
+    field: &'a Field,
+    kernels: &'a SweepKernels,
+    volumes: &'a SweptVolumes,
     reference_mm: f32,
-    todo: &Buffer,
-    ambient: &Image,
-) -> Result<()> {
-    kernels.sweep.record(
-        rec,
-        field,
-        &volumes.plan,
-        direction,
-        reference_mm,
-        &volumes.opacity,
-        &volumes.lists.list,
-        todo,
-        ambient,
-    )?;
-    rec.barrier(
-        &[Access::StorageRead, Access::StorageWrite],
-        &[
-            Access::StorageRead,
-            Access::StorageWrite,
-            Access::SampledRead,
-            Access::GraphicsRead,
-            Access::TransferRead,
-        ],
-    );
-    Ok(())
+    todo: &'a Buffer,
+    ambient: &'a Image,
+}
+
+impl Target<'_> {
+    fn record(&self, rec: &mut Recorder, step: Step) -> Result<()> {
+        let Target { field, kernels, volumes, reference_mm, todo, ambient } = *self;
+        let (plan, lists) = (&volumes.plan, &volumes.lists);
+        match step {
+            Step::List { amend } => {
+                let bindings = sweep_list::Bindings { todo, chosen: &volumes.chosen, lists };
+                kernels.list.record(rec, field, plan, amend, bindings)
+            }
+            Step::Exchange => kernels.past.record(rec, field, &volumes.past, &volumes.opacity),
+            Step::Direction { index, pass } => {
+                let bindings = sweep::Bindings {
+                    opacity: &volumes.opacity,
+                    list: &lists.list,
+                    todo,
+                    solid: if pass == Pass::TakeBack { &volumes.solid_before } else { &volumes.solid },
+                    ambient,
+                };
+                kernels.sweep.record(rec, field, plan, index, pass, reference_mm, bindings)?;
+                rec.barrier(
+                    &[Access::StorageRead, Access::StorageWrite],
+                    &[
+                        Access::StorageRead,
+                        Access::StorageWrite,
+                        Access::SampledRead,
+                        Access::GraphicsRead,
+                        Access::TransferRead,
+                    ],
+                );
+                Ok(())
+            }
+        }
+    }
+
+    /// Each step on the device's own queue, telling `progress` the share done (0 … 1). Waits for the end.
+    fn run(&self, gpu: &Gpu, anew_only: bool, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
+        let stages = stages(&self.volumes.plan, anew_only);
+        let all: usize = stages.iter().map(|(_, steps)| steps.len()).sum();
+        let mut done = 0;
+        let mut timings = Timings::new();
+        for (stage, steps) in stages {
+            let mut total_ms = 0.0;
+            for step in steps {
+                let mut rec = gpu.recorder(stage)?;
+                rec.stage(stage)?;
+                self.record(&mut rec, step)?;
+                rec.end_stage()?;
+                total_ms += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
+                done += 1;
+                progress(done as f64 / all as f64);
+            }
+            timings.push((stage.into(), total_ms));
+        }
+        Ok(timings)
+    }
+}
+
+impl SweptVolumes {
+    fn target<'a>(&'a self, field: &'a Field, kernels: &'a SweepKernels, reference_mm: f32) -> Target<'a> {
+        Target { field, kernels, volumes: self, reference_mm, todo: &self.todo, ambient: &self.ambient }
+    }
 }
 
 /// Records the whole update of V_o and V_AO into a command buffer.
@@ -272,23 +359,18 @@ pub fn record(
     edit: &Edit,
 ) -> Result<()> {
     record_choice(rec, field, kernels, volumes, transfer, clips, edit)?;
-    rec.stage("sweep")?;
-    for direction in 0..volumes.plan.walks.len() {
-        record_direction(
-            rec,
-            field,
-            kernels,
-            volumes,
-            direction,
-            edit.reference_mm,
-            &volumes.todo,
-            &volumes.ambient,
-        )?;
+    let target = volumes.target(field, kernels, edit.reference_mm);
+    for (stage, steps) in stages(&volumes.plan, edit.ambient) {
+        rec.stage(stage)?;
+        for step in steps {
+            target.record(rec, step)?;
+        }
+        rec.end_stage()?;
     }
-    rec.end_stage()
+    Ok(())
 }
 
-/// The same on the device's own queue, a direction at a time, telling `progress` the share done (0 … 1). Waits for the end.
+/// The same on the device's own queue, a step at a time, telling `progress` the share done (0 … 1). Waits for the end.
 #[expect(clippy::too_many_arguments, reason = "inputs, outputs and settings, each named once")]
 pub fn run(
     gpu: &Gpu,
@@ -303,33 +385,8 @@ pub fn run(
     let mut rec = gpu.recorder("choice")?;
     record_choice(&mut rec, field, kernels, volumes, transfer, clips, edit)?;
     let mut timings = rec.submit_and_wait()?;
-    let (reference_mm, v) = (edit.reference_mm, volumes);
-    timings.push(run_directions(gpu, field, kernels, v, reference_mm, &v.todo, &v.ambient, progress)?);
+    timings.extend(volumes.target(field, kernels, edit.reference_mm).run(gpu, edit.ambient, progress)?);
     Ok(timings)
-}
-
-#[expect(clippy::too_many_arguments, reason = "inputs, outputs and settings, each named once")]
-fn run_directions(
-    gpu: &Gpu,
-    field: &Field,
-    kernels: &SweepKernels,
-    volumes: &SweptVolumes,
-    reference_mm: f32,
-    todo: &Buffer,
-    ambient: &Image,
-    progress: &mut dyn FnMut(f64),
-) -> Result<(String, f64)> {
-    let directions = volumes.plan.walks.len();
-    let mut total_ms = 0.0;
-    for direction in 0..directions {
-        let mut rec = gpu.recorder("sweep")?;
-        rec.stage("sweep")?;
-        record_direction(&mut rec, field, kernels, volumes, direction, reference_mm, todo, ambient)?;
-        rec.end_stage()?;
-        total_ms += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
-        progress((direction + 1) as f64 / directions as f64);
-    }
-    Ok(("sweep".into(), total_ms))
 }
 
 /// Computes every value anew into `ambient`, which is all 1 before, from V_o as it is; leaves everything else as it was. Returns
@@ -347,13 +404,16 @@ pub fn recompute(
     let read_back = gpu.buffer("bricks read-back", all.bytes(), BufferUse::Readback)?;
     let mut rec = gpu.recorder("recompute")?;
     rec.fill(&volumes.change, 0, volumes.change.bytes(), 0)?;
+    rec.fill(&all, 0, all.bytes(), 0)?;
     rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-    choose(&mut rec, field, kernels, volumes, &all)?;
+    choose(&mut rec, field, kernels, volumes, true, &all)?;
+    rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
     rec.copy_buffer(&all, 0, &read_back, 0, all.bytes())?;
     rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
     let mut timings = rec.submit_and_wait()?;
-    timings.push(run_directions(gpu, field, kernels, volumes, reference_mm, &all, ambient, progress)?);
+    let target = Target { todo: &all, ambient, ..volumes.target(field, kernels, reference_mm) };
+    timings.extend(target.run(gpu, true, progress)?);
     let todo: Vec<u32> = bytemuck::pod_collect_to_vec(&read_back.read(0, all.bytes())?);
-    let bricks: Vec<u32> = (0..todo.len() as u32).filter(|&brick| todo[brick as usize] == 1).collect();
+    let bricks: Vec<u32> = (0..todo.len() as u32).filter(|&brick| todo[brick as usize] & ANEW != 0).collect();
     Ok((BrickList::of(gpu, &bricks)?, timings))
 }

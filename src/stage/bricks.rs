@@ -44,7 +44,12 @@ impl BrickList {
 
     /// Memory for all bricks of a field.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
-        let bytes = 16 + 4 * u64::from(field.brick_count());
+        Self::with_room(gpu, field.brick_count())
+    }
+
+    /// Memory for so many bricks.
+    pub fn with_room(gpu: &Gpu, bricks: u32) -> Result<Self> {
+        let bytes = 16 + 4 * u64::from(bricks);
         Ok(Self { buffer: gpu.buffer("brick list", bytes, BufferUse::Device)? })
     }
 

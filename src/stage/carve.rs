@@ -3,13 +3,14 @@
 //!
 //! In: `volume`, `transfer`, the clips, the words of [`super::clip_bricks`] now and at the last edit, `occupancy`. In and out:
 //! `opacity` V_o (3D r16unorm), `contact` (where each brick's opacity lies, 27 bits). Out: `change` (f32 a brick: 0 where an
-//! opacity changed, left alone elsewhere). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
+//! opacity changed, left alone elsewhere), `past` (the changed bricks and what they held before). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
 //! voxel in the others, clip samples only where a clip's surface passes.
 
 use super::bricks::BrickList;
 use super::classify::{AntiAliasing, Classify};
 use super::clips::ClipSet;
 use super::field::Field;
+use super::past::PastBricks;
 use super::row_of_groups;
 use super::transfer::TransferBuffer;
 use crate::Result;
@@ -27,9 +28,11 @@ struct Params {
     levels: f32,
     slope: f32,
     bias: f32,
-    pad: u32,
+    capacity: u32,
 }
-layout_check!(Params => shaders::carve::CARVE_PARAMS { dims, extra_samples, spacing, all, levels, slope, bias });
+layout_check!(Params => shaders::carve::CARVE_PARAMS {
+    dims, extra_samples, spacing, all, levels, slope, bias, capacity
+});
 
 /// What the kernel reads and writes.
 #[derive(Clone, Copy)]
@@ -50,6 +53,10 @@ pub struct Bindings<'a> {
     pub change: &'a Buffer,
     /// Bricks to work on; filled here.
     pub list: &'a BrickList,
+    /// Which octants of each brick changed, in bits of [`super::near::CHANGED`] and on; filled here.
+    pub todo: &'a Buffer,
+    /// What changed bricks held before; filled here.
+    pub past: &'a PastBricks,
     /// V_o.
     pub opacity: &'a Image,
 }
@@ -88,10 +95,13 @@ impl Carve {
             levels,
             slope,
             bias,
-            pad: 0,
+            capacity: b.past.capacity,
         };
         let params = bytemuck::bytes_of(&params);
         b.list.record_clear(rec)?;
+        b.past.list.record_clear(rec)?;
+        rec.fill(b.todo, 0, b.todo.bytes(), 0)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let binds = [
             ("clip_bricks", Bind::Buffer(b.clip_bricks)),
             ("clip_bricks_before", Bind::Buffer(b.clip_bricks_before)),
@@ -114,6 +124,9 @@ impl Carve {
             ("contact", Bind::Buffer(b.contact)),
             ("change", Bind::Buffer(b.change)),
             ("list", Bind::Buffer(&b.list.buffer)),
+            ("changed", Bind::Buffer(&b.past.list.buffer)),
+            ("past", Bind::Buffer(&b.past.opacities)),
+            ("todo", Bind::Buffer(b.todo)),
             ("opacity", Bind::Image(b.opacity)),
         ];
         rec.dispatch_indirect(&self.carve, &binds, params, &b.list.buffer, 0)

@@ -16,6 +16,7 @@ pub mod lao;
 pub mod near;
 pub mod occupancy;
 pub mod opacity;
+pub mod past;
 pub mod peel;
 pub mod raycast;
 pub mod reference;

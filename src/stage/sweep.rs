@@ -65,8 +65,8 @@ layout_check!(Params => shaders::sweep::SWEEP_PARAMS {
 
 /// Longest window of the kernel, in segments.
 const MOST_SEGMENTS: u32 = 128;
-/// Edge of a tile of lines, as the kernels have it.
-const TILE: u32 = 8;
+/// Lines of a tile along the two axes across a walk, as the kernels have them.
+const TILE: [u32; 2] = [8, 4];
 /// Segments of a chunk, as the kernels have it.
 const CHUNK: u32 = 8;
 
@@ -75,6 +75,8 @@ const CHUNK: u32 = 8;
 pub struct Walk {
     /// The lattice direction, its last component that is not 0 positive; the weight is that of each of the two.
     pub ray: LatticeRay,
+    /// The same weight in 65535ths, see [`LatticeRays::parts`].
+    pub parts: u32,
     /// Axis along which lines are walked: one of stride 1 where there is one, x last, so that lanes lie along x.
     pub axis: usize,
     /// Segments of a window, behind the first of a ray: W − 1, at least 1.
@@ -85,7 +87,7 @@ pub struct Walk {
     pub pieces: u32,
     /// Length of a segment in mm.
     pub length_mm: f64,
-    /// Tiles of 8x8 lines across the walk.
+    /// Tiles of 8x4 lines across the walk.
     pub tiles: [u32; 2],
     /// Most runs that the list can hold for it.
     pub runs: u32,
@@ -137,8 +139,8 @@ impl SweepPlan {
         let mut walks = Vec::new();
         let mut reach_mm: f64 = 0.0;
         // Sets are symmetric: the other half are the reverses, of equal weight.
-        let forward = |ray: &LatticeRay| ray.step.into_iter().rev().find(|&c| c != 0) > Some(0);
-        for ray in rays.rays.into_iter().filter(forward) {
+        let parts = rays.parts();
+        for (ray, parts) in rays.rays.into_iter().zip(parts).filter(|(ray, _)| ray.forward()) {
             let length_mm = ray.length_mm(spacing);
             if offset_mm >= length_mm {
                 return Err(Error::Config {
@@ -168,15 +170,52 @@ impl SweepPlan {
                 .unwrap_or(2);
             let window = (segments - 1).max(1);
             let across: [usize; 2] = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
-            let tiles = across.map(|a| dims[a].div_ceil(TILE));
+            let tiles = [0, 1].map(|i| dims[across[i]].div_ceil(TILE[i]));
             let stride = ray.step[axis].unsigned_abs();
             // A run is a chunk with a voxel and `lag` more; between two runs is one at least.
             let size = window.min(CHUNK);
             let (chunks, lag) = (dims[axis].div_ceil(stride).div_ceil(size), window / size + 1);
             let runs = tiles[0] * tiles[1] * stride * chunks.div_ceil(lag + 2);
-            walks.push(Walk { ray, axis, window, segments, pieces, length_mm, tiles, runs });
+            walks.push(Walk { ray, parts, axis, window, segments, pieces, length_mm, tiles, runs });
         }
         Ok(Self { walks, residual: rays.residual, offset_mm, reach_mm })
+    }
+}
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// V_o.
+    pub opacity: &'a Image,
+    /// Runs of lines.
+    pub list: &'a Buffer,
+    /// What is to be done in each brick.
+    pub todo: &'a Buffer,
+    /// Where there is opacity.
+    pub solid: &'a Buffer,
+    /// V_AO.
+    pub ambient: &'a Image,
+}
+
+/// What a sweep does with its rays' contributions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// All rays of bricks to compute anew are summed.
+    Anew,
+    /// Rays that meet a change: what they contributed is taken back.
+    TakeBack,
+    /// Rays that meet a change: what they contribute now is added.
+    Amend,
+}
+
+impl Pass {
+    /// As the kernel has them; `first`: the direction begins the sum.
+    fn flags(self, first: bool) -> u32 {
+        match self {
+            Self::Anew => u32::from(first),
+            Self::Amend => 2,
+            Self::TakeBack => 2 | 4,
+        }
     }
 }
 
@@ -202,11 +241,9 @@ impl Sweep {
         field: &Field,
         plan: &SweepPlan,
         index: usize,
+        pass: Pass,
         reference_mm: f32,
-        opacity: &Image,
-        list: &Buffer,
-        todo: &Buffer,
-        ambient: &Image,
+        b: Bindings,
     ) -> Result<()> {
         let walk = &plan.walks[index];
         let start = plan.offset_mm / walk.length_mm;
@@ -216,20 +253,21 @@ impl Sweep {
             step: walk.ray.step,
             window: walk.window,
             bricks: field.bricks(),
-            flags: u32::from(index == 0),
+            flags: pass.flags(index == 0),
             tiles: walk.tiles,
             list: index as u32,
             pieces: walk.pieces,
             depth: (walk.length_mm / f64::from(walk.pieces) / f64::from(reference_mm)) as f32,
             start: start as f32,
             far: (walk.segments - 1) as f32,
-            share: (walk.ray.weight / (f64::from(walk.segments) - start)) as f32,
+            share: (f64::from(walk.parts) / (f64::from(walk.segments) - start)) as f32,
         };
         let binds = [
-            ("opacity", Bind::Image(opacity)),
-            ("list", Bind::Buffer(list)),
-            ("todo", Bind::Buffer(todo)),
-            ("ambient", Bind::Image(ambient)),
+            ("opacity", Bind::Image(b.opacity)),
+            ("list", Bind::Buffer(b.list)),
+            ("todo", Bind::Buffer(b.todo)),
+            ("solid", Bind::Buffer(b.solid)),
+            ("ambient", Bind::Image(b.ambient)),
         ];
         let at = super::sweep_list::HEAD_BYTES * index as u64;
         // By the plan alone, so that full and partial updates run the same code.
@@ -238,6 +276,6 @@ impl Sweep {
             _ if walk.window < CHUNK => &self.short,
             _ => &self.pipeline,
         };
-        rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), list, at)
+        rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), b.list, at)
     }
 }

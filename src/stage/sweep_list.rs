@@ -16,11 +16,11 @@ use bytemuck::{Pod, Zeroable};
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Params {
     dims: [u32; 3],
-    pad: u32,
+    amend: u32,
     bricks: [u32; 3],
-    pad_end: u32,
+    cell: i32,
 }
-layout_check!(Params => shaders::sweep_list::LIST_PARAMS { dims, bricks });
+layout_check!(Params => shaders::sweep_list::LIST_PARAMS { dims, amend, bricks, cell });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -30,8 +30,10 @@ struct Direction {
     tiles: [u32; 2],
     count: u32,
     window: u32,
+    beside: u32,
+    pad: [u32; 3],
 }
-layout_check!(Direction => shaders::sweep_list::DIRECTION { step, axis, tiles, count, window });
+layout_check!(Direction => shaders::sweep_list::DIRECTION { step, axis, tiles, count, window, beside });
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -77,6 +79,8 @@ impl SweepLists {
                 tiles: walk.tiles,
                 count: walk.tile_count(),
                 window: walk.window,
+                beside: u32::from(walk.pieces > 1),
+                pad: [0; 3],
             });
         }
         directions.resize(directions.len().max(1), Direction::zeroed());
@@ -90,6 +94,17 @@ impl SweepLists {
     }
 }
 
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// What is to be done in each brick.
+    pub todo: &'a Buffer,
+    /// Where there is something to be done at all.
+    pub chosen: &'a Buffer,
+    /// The runs; filled here.
+    pub lists: &'a SweepLists,
+}
+
 /// The kernel `sweep_list`.
 pub struct SweepList {
     pipeline: Pipeline,
@@ -101,29 +116,40 @@ impl SweepList {
         Ok(Self { pipeline: gpu.compute(&shaders::sweep_list::SHADER, "main")? })
     }
 
-    /// Fills the list and makes it visible to indirect dispatches and compute shaders.
+    /// Fills the list, with the rays that meet a change or else with those of bricks to compute anew, and makes it visible to indirect dispatches and compute shaders.
     pub fn record(
         &self,
         rec: &mut Recorder,
         field: &Field,
         plan: &SweepPlan,
-        todo: &Buffer,
-        lists: &SweepLists,
+        amend: bool,
+        b: Bindings,
     ) -> Result<()> {
         rec.barrier(
             &[Access::IndirectRead, Access::StorageRead],
             &[Access::TransferWrite, Access::StorageWrite],
         );
-        rec.update(&lists.list, 0, bytemuck::bytes_of(&lists.heads))?;
+        rec.update(&b.lists.list, 0, bytemuck::bytes_of(&b.lists.heads))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let directions = plan.walks.len() as u32;
-        let params = Params { dims: field.dims, pad: 0, bricks: field.bricks(), pad_end: 0 };
+        let params = Params {
+            dims: field.dims,
+            amend: u32::from(amend),
+            bricks: field.bricks(),
+            cell: if amend { 4 } else { 8 },
+        };
         let binds = [
-            ("directions", Bind::Buffer(&lists.directions)),
-            ("todo", Bind::Buffer(todo)),
-            ("list", Bind::Buffer(&lists.list)),
+            ("directions", Bind::Buffer(&b.lists.directions)),
+            ("todo", Bind::Buffer(b.todo)),
+            ("list", Bind::Buffer(&b.lists.list)),
+            ("bounds", Bind::Buffer(b.chosen)),
         ];
-        rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), [lists.tiles, directions, 1])?;
+        rec.dispatch_over(
+            &self.pipeline,
+            &binds,
+            bytemuck::bytes_of(&params),
+            [b.lists.tiles, directions, 1],
+        )?;
         rec.barrier(
             &[Access::StorageWrite],
             &[Access::IndirectRead, Access::StorageRead, Access::StorageWrite, Access::TransferRead],
