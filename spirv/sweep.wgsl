@@ -38,6 +38,10 @@ struct SweepParams {
     far: f32,
     // weight of a direction in 65535ths / length of the ray in segments
     share: f32,
+    // the lattice direction without whole sizes of the volume
+    advance: vec3<i32>,
+    // so many segments pass one border of bricks on each axis at most
+    part: i32,
 }
 
 struct Todo {
@@ -235,7 +239,6 @@ struct Step {
     gap: bool,
 }
 
-// `advance` is the step without whole sizes of the volume.
 fn step_from(p: vec3<i32>, advance: vec3<i32>) -> Step {
     let dims = vec3<i32>(params.dims);
     let next = p + advance;
@@ -267,13 +270,10 @@ fn subtract(p: vec3<i32>, parts: f32) {
 
 // Whether the next `size` segments from p stay inside the volume and meet no brick with opacity.
 fn free_from(p: vec3<i32>, size: i32) -> bool {
-    let most = max(max(abs(params.step.x), abs(params.step.y)), abs(params.step.z));
-    // So many segments pass one border of bricks on each axis at most.
-    let part = 8 / most;
     var solid_bits = 0u;
-    for (var i = 0; i < size; i += part) {
+    for (var i = 0; i < size; i += params.part) {
         let a = p + i * params.step;
-        let b = p + min(i + part, size) * params.step;
+        let b = p + min(i + params.part, size) * params.step;
         let low = min(a, b);
         let high = max(a, b);
         if any(low < vec3(0)) || any(high >= vec3<i32>(params.dims)) {
@@ -300,11 +300,11 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
         return;
     }
     let steps = line_steps(line.z, params.axis, dims, params.step);
-    let advance = params.step % dims;
+    let advance = params.advance;
     let window = i32(params.window);
     let size = select(chunk_size(window), CHUNK, long);
     // The middle: so many segments that are the last of their chunk, then so many whole chunks.
-    let whole = (window - size) / size;
+    let whole = chunks_in(window) - 1;
     let odd = window - size - whole * size;
     let middle_length = f32(window - size);
     // 0 where a ray is its head only.

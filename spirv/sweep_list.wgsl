@@ -2,9 +2,9 @@
 // chunks to walk, so that nothing is walked elsewhere. Chunks are fixed in the lattice, so what a voxel's value is does not
 // depend on what is listed.
 //
-// For a voxel in chunk c its ray forwards is found in chunk c, and its ray backwards up to `lag` chunks before. The rays that meet a
-// voxel in chunk c, in either direction, are found in chunks c - lag ... c too. So both need the same runs, of bricks
-// to compute anew or of voxels that changed.
+// For the voxel of step i its ray forwards is found in step i, and its ray backwards a window and a step before. The rays that meet
+// it, in either direction, are found in these and the steps between. So both need the same runs, of bricks to compute anew
+// or of voxels that changed. Chunks are counted from `lag` before a line's first voxel, so that none is negative.
 
 struct ListParams {
     dims: vec3<u32>,
@@ -63,85 +63,100 @@ var<immediate> params: ListParams;
 @group(0) @binding(2) var<storage, read_write> list: CountedList;
 @group(0) @binding(3) var<storage, read> bounds: Bounds;
 
-// Wrapped into the volume, and voxels from there to the end of its cell or of the volume, whichever comes first.
-fn piece(x: i32, size: i32) -> vec2<i32> {
-    var at = x % size;
-    at += select(0, size, at < 0);
-    return vec2(at, min(params.cell - (at & (params.cell - 1)), size - at));
+// The voxels from x, in the volume, to the end of its cell or of the volume, whichever comes first.
+fn piece(x: i32, size: i32) -> i32 {
+    return min(params.cell - (x & (params.cell - 1)), size - x);
 }
 
-// Whether a brick to compute anew, or an octant that changed, meets the box low ... high (inclusive, wrapping across the walk)
-// in the cells' layer of `along`.
-fn any_cell(low: vec2<i32>, high: vec2<i32>, along: i32, axis: u32, dims: vec3<i32>) -> bool {
+// Whether a brick to compute anew, or an octant that changed, meets the box, which wraps round, in the cells' layer of `along`.
+fn any_cell(box: Across, along: i32, axis: u32, dims: vec3<i32>) -> bool {
     let across = line_axes(axis);
     let extent = line_extent(axis, dims);
     var voxel = vec3(along);
-    for (var w = low.y; w <= high.y; ) {
-        let row = piece(w, extent.y);
-        voxel[across.y] = row.x;
-        for (var u = low.x; u <= high.x; ) {
-            let column = piece(u, extent.x);
-            voxel[across.x] = column.x;
+    var w = box.begin.y;
+    for (var left = box.size.y; left > 0; ) {
+        let rows = piece(w, extent.y);
+        voxel[across.y] = w;
+        var u = box.begin.x;
+        for (var left = box.size.x; left > 0; ) {
+            let columns = piece(u, extent.x);
+            voxel[across.x] = u;
             let at = vec3<u32>(voxel) / 8u;
             let word = todo.brick[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
             let octant = vec3<u32>(voxel) / 4u & vec3(1u);
             if (word & select(ANEW, CHANGED << (octant.x + 2u * octant.y + 4u * octant.z), params.amend == 1u)) != 0u {
                 return true;
             }
-            u += column.y;
+            left -= columns;
+            u = select(u + columns, 0, u + columns == extent.x);
         }
-        w += row.y;
+        left -= rows;
+        w = select(w + rows, 0, w + rows == extent.y);
     }
     return false;
 }
 
-// Whether the voxels low ... high, wrapped into the extent, miss bricks first ... last.
-fn misses(low: i32, high: i32, extent: i32, first: u32, last: u32) -> bool {
-    var begin = low % extent;
-    begin += select(0, extent, begin < 0);
-    let end = begin + high - low;
-    let wanted = vec2(8 * i32(first), 8 * i32(last) + 7);
-    return (begin > wanted.y || end < wanted.x) && end - extent < wanted.x;
+// Whether `size` voxels from `begin` on, wrapped into the extent, miss bricks first ... last.
+fn misses(begin: i32, size: i32, extent: i32, first: u32, last: u32) -> bool {
+    let end = begin + size - 1;
+    return (begin > 8 * i32(last) + 7 || end < 8 * i32(first)) && end - extent < 8 * i32(first);
 }
 
-// Whether chunk c of a tile's lines has something; conservative by the tile's bounding boxes.
-fn wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i32>) -> bool {
+// What the lines of a tile pass across the walk in steps i ... j: where it begins, wrapped into the volume, and its size.
+struct Across {
+    begin: vec2<i32>,
+    size: vec2<i32>,
+}
+
+fn across_steps(line: vec3<i32>, i: i32, j: i32, d: Direction, dims: vec3<i32>) -> Across {
     let across = line_axes(d.axis);
     let extent = line_extent(d.axis, dims);
     let slope = vec2(d.step[across.x], d.step[across.y]);
+    let width = min(vec2<i32>(TILE), extent - line.xy);
+    let low = line.xy + min(i * slope, j * slope);
+    return Across(vec2(wrap(low.x, extent.x), wrap(low.y, extent.y)), abs((j - i) * slope) + width);
+}
+
+// The first step of chunk c of a tile's lines, or one not far before it, that has something, or -1; conservative by the tile's
+// bounding boxes.
+fn first_wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i32>) -> i32 {
     let stride = d.step[d.axis];
-    let width = min(vec2<i32>(TILE), extent - line.xy) - 1;
     let size = chunk_size(i32(d.window));
-    // Where there is something at all.
-    let box = 3u * params.amend;
-    let first = vec3(bounds.low[box], bounds.low[box + 1u], bounds.low[box + 2u]);
-    let end = vec3(bounds.high[box], bounds.high[box + 1u], bounds.high[box + 2u]);
     // Those beside a segment lie in the box of its ends, so among what lies between a step, the one before and the one behind.
     let beside = i32(d.beside * params.amend);
     var i = c * size;
     let last = min(i + size + beside, steps) - 1;
+    let origin = select(line.z, dims[d.axis] - 1 - line.z, stride < 0);
+
+    // Where there is something at all.
+    let kind = 3u * params.amend;
+    let first = vec3(bounds.low[kind], bounds.low[kind + 1u], bounds.low[kind + 2u]);
+    let end = vec3(bounds.high[kind], bounds.high[kind + 1u], bounds.high[kind + 2u]);
+    let axes = line_axes(d.axis);
+    let extent = line_extent(d.axis, dims);
+    let ends = origin + vec2(i - beside, last + beside) * stride;
+    let chunk = across_steps(line, i - beside, last + beside, d, dims);
+    if max(ends.x, ends.y) < 8 * i32(first[d.axis]) || min(ends.x, ends.y) > 8 * i32(end[d.axis]) + 7
+        || misses(chunk.begin.x, chunk.size.x, extent.x, first[axes.x], end[axes.x])
+        || misses(chunk.begin.y, chunk.size.y, extent.y, first[axes.y], end[axes.y]) {
+        return -1;
+    }
     while i <= last {
         // Steps i ... j are in the same layer of cells.
-        let a = select(line.z, dims[d.axis] - 1 - line.z, stride < 0) + i * stride;
+        let a = origin + i * stride;
         let inside = a & (params.cell - 1);
-        let j = min(i + select(params.cell - 1 - inside, inside, stride < 0) / abs(stride), last);
-        let low = line.xy + min((i - beside) * slope, (j + beside) * slope);
-        let high = line.xy + max((i - beside) * slope, (j + beside) * slope) + width;
-        let hit = !misses(low.x, high.x, extent.x, first[across.x], end[across.x])
-            && !misses(low.y, high.y, extent.y, first[across.y], end[across.y]);
+        let j = min(i + quotient(select(params.cell - 1 - inside, inside, stride < 0), abs(stride)), last);
+        let across = across_steps(line, i - beside, j + beside, d, dims);
         // Also where a line ends between two layers of cells.
-        let before = clamp(a - beside * stride, 0, dims[d.axis] - 1);
-        let behind = clamp(a + (j - i + beside) * stride, 0, dims[d.axis] - 1);
-        for (var k = 0; hit && k <= 2 * beside; k++) {
-            let along = vec3(a, before, behind)[k];
-            let brick = u32(along) / 8u;
-            if brick >= first[d.axis] && brick <= end[d.axis] && any_cell(low, high, along, d.axis, dims) {
-                return true;
+        let along = clamp(a + vec3(0, -beside, j - i + beside) * stride, vec3(0), vec3(dims[d.axis] - 1));
+        for (var k = 0; k <= 2 * beside; k++) {
+            if any_cell(across, along[k], d.axis, dims) {
+                return i;
             }
         }
         i = j + 1;
     }
-    return false;
+    return -1;
 }
 
 fn add_run(direction: u32, run: Run) {
@@ -161,22 +176,25 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let dims = vec3<i32>(params.dims);
     let line = line_at(id.x, vec2(0u), d.tiles, d.axis, dims);
     let steps = line_steps(line.z, d.axis, dims, d.step);
-    let size = chunk_size(i32(d.window));
-    let lag = chunk_lag(i32(d.window));
-    let chunks = (steps + size - 1) / size;
+    let window = i32(d.window);
+    let size = chunk_size(window);
+    let lag = chunk_lag(window);
+    let chunks = quotient(steps + size - 1, size);
     // Rays backwards are amended where they begin, up to so many chunks behind a run: no other run may work there.
     let apart = select(0, lag - 1, params.amend == 1u);
     // The run that is open: from its first chunk to before `end`.
     var first = 0;
     var end = 0;
     for (var c = 0; c <= chunks; c++) {
-        let more = c < chunks && wanted(line, c, steps, d, dims);
-        if end > first && (c == chunks || (more && c > end + apart)) {
+        let step = select(-1, first_wanted(line, c, steps, d, dims), c < chunks);
+        // The rays that it needs begin a window before it at the earliest.
+        let begin = quotient(step + lag * size - window - 1, size);
+        if end > first && (c == chunks || (step >= 0 && begin > end + apart)) {
             add_run(id.y, Run(id.x, u32(first), u32(end - first)));
             end = first;
         }
-        if more {
-            first = select(c, first, end > first);
+        if step >= 0 {
+            first = select(begin, first, end > first);
             end = c + lag + 1;
         }
     }

@@ -42,16 +42,30 @@ fn line_extent(axis: u32, dims: vec3<i32>) -> vec2<i32> {
     return vec2(dims[across.x], dims[across.y]);
 }
 
+// floor(a / b) for |a| < 2^24, b > 0. A software driver divides integers lane by lane, floats all at once.
+fn quotient(a: i32, b: i32) -> i32 {
+    let near = i32(floor(f32(a) / f32(b)));
+    let rest = a - near * b;
+    return near + select(0, 1, rest >= b) - select(0, 1, rest < 0);
+}
+
+// Into 0 ... size - 1.
+fn wrap(x: i32, size: i32) -> i32 {
+    return x - quotient(x, size) * size;
+}
+
 // Place u, w and layer of a line of a tile.
 fn line_at(tile: u32, local: vec2<u32>, tiles: vec2<u32>, axis: u32, dims: vec3<i32>) -> vec3<i32> {
-    let place = vec2(tile % tiles.x, tile / tiles.x % tiles.y) * TILE + local;
-    return vec3(vec2<i32>(place), i32(tile / (tiles.x * tiles.y)));
+    let row = quotient(i32(tile), i32(tiles.x));
+    let layer = quotient(row, i32(tiles.y));
+    let place = vec2(i32(tile) - row * i32(tiles.x), row - layer * i32(tiles.y));
+    return vec3(place * vec2<i32>(TILE) + vec2<i32>(local), layer);
 }
 
 // Number of a line's voxels.
 fn line_steps(layer: i32, axis: u32, dims: vec3<i32>, step: vec3<i32>) -> i32 {
     let stride = abs(step[axis]);
-    return (dims[axis] - layer + stride - 1) / stride;
+    return quotient(dims[axis] - layer + stride - 1, stride);
 }
 
 // Chunk c is the steps c size ... c size + size - 1.
@@ -59,16 +73,14 @@ fn chunk_size(window: i32) -> i32 {
     return min(window, CHUNK);
 }
 
-// Rays that end in a chunk and go backwards begin up to so many chunks further on.
-fn chunk_lag(window: i32) -> i32 {
-    let size = chunk_size(window);
-    return (window + size) / size;
+// Whole chunks of a window.
+fn chunks_in(window: i32) -> i32 {
+    return max(window / CHUNK, 1);
 }
 
-// Into 0 ... dims - 1.
-fn wrapped(p: vec3<i32>, dims: vec3<i32>) -> vec3<i32> {
-    let rest = p % dims;
-    return rest + select(vec3(0), dims, rest < vec3(0));
+// Rays that end in a chunk and go backwards begin up to so many chunks further on.
+fn chunk_lag(window: i32) -> i32 {
+    return chunks_in(window) + 1;
 }
 
 fn line_position(line: vec3<i32>, i: i32, axis: u32, dims: vec3<i32>, step: vec3<i32>) -> vec3<i32> {
@@ -77,5 +89,6 @@ fn line_position(line: vec3<i32>, i: i32, axis: u32, dims: vec3<i32>, step: vec3
     begin[across.x] = line.x;
     begin[across.y] = line.y;
     begin[axis] = select(line.z, dims[axis] - 1 - line.z, step[axis] < 0);
-    return wrapped(begin + i * step, dims);
+    let p = begin + i * step;
+    return vec3(wrap(p.x, dims.x), wrap(p.y, dims.y), wrap(p.z, dims.z));
 }

@@ -1,21 +1,19 @@
-//! Which chunks of which tiles of lines hold a voxel to compute (method.md §4, sparse sweeps), by asking every voxel.
+//! Which steps of which tiles of lines hold a voxel to compute (method.md §4, sparse sweeps), by asking every voxel.
 //!
 //! A voxel x lies on the line that began at layer r of the walk's axis, r < |v_a|, and is reached after i steps:
 //! x_a = r + i·|v_a| (from the other end where v_a < 0). Across the walk the line began at x − i·v, modulo the volume. Eight by four
-//! lines of a layer are a tile, `size` steps a chunk.
+//! lines of a layer are a tile.
 
 use std::collections::BTreeSet;
 
 /// Lines of a tile along the two axes across a walk.
 const TILE: [usize; 2] = [8, 4];
 
-/// Tiles, the first axis across the walk fastest, then the second, then layers; and in them chunks of `size` steps, from a line's
-/// first voxel on.
+/// Tiles, the first axis across the walk fastest, then the second, then layers; and in them steps from a line's first voxel on.
 pub fn sweep_list(
     dims: [usize; 3],
     step: [i32; 3],
     axis: usize,
-    size: usize,
     todo: impl Fn([usize; 3]) -> bool,
 ) -> BTreeSet<(usize, usize)> {
     let stride = step[axis].unsigned_abs() as usize;
@@ -36,7 +34,7 @@ pub fn sweep_list(
                 let tiles = dims[across[0]].div_ceil(TILE[0]);
                 let rows = dims[across[1]].div_ceil(TILE[1]);
                 let tile = (layer * rows + place(across[1]) / TILE[1]) * tiles + place(across[0]) / TILE[0];
-                found.insert((tile, i / size));
+                found.insert((tile, i));
             }
         }
     }
@@ -48,20 +46,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_voxel_is_in_one_chunk() {
+    fn one_voxel_is_in_one_step() {
         let one = |at: [usize; 3]| move |voxel: [usize; 3]| voxel == at;
         let dims = [16, 10, 20];
         // Step 9 along z from (13 + 9, 5) mod (16, 10): place (6, 5).
         assert_eq!(
-            sweep_list(dims, [-1, 0, 1], 2, 4, one([13, 5, 9])).into_iter().collect::<Vec<_>>(),
-            [(2, 2)]
+            sweep_list(dims, [-1, 0, 1], 2, one([13, 5, 9])).into_iter().collect::<Vec<_>>(),
+            [(2, 9)]
         );
         // Two layers; 9 is in the second, at step 4; place (9, 5 - 4).
-        assert_eq!(
-            sweep_list(dims, [0, 1, 2], 2, 4, one([9, 5, 9])).into_iter().collect::<Vec<_>>(),
-            [(7, 1)]
-        );
-        assert!(sweep_list(dims, [1, 0, 0], 0, 8, |_| false).is_empty());
-        assert_eq!(sweep_list(dims, [1, 0, 0], 0, 8, |_| true).len(), 2 * 5 * 2);
+        assert_eq!(sweep_list(dims, [0, 1, 2], 2, one([9, 5, 9])).into_iter().collect::<Vec<_>>(), [(7, 4)]);
+        assert!(sweep_list(dims, [1, 0, 0], 0, |_| false).is_empty());
+        assert_eq!(sweep_list(dims, [1, 0, 0], 0, |_| true).len(), 2 * 5 * 16);
     }
 }

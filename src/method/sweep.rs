@@ -1,8 +1,16 @@
 //! Line sweeps with contextual updates from change (method.md §4, §5.2): V_o is brought up to date in place and compared with
-//! what V_AO was computed from; bricks within reach of a change are swept along every direction, the others keep their values.
-//! Exact for any edit, clips, transfer function, values, radius: a value depends on nothing but the opacities of its windows.
+//! what V_AO was computed from. Exact for any edit, clips, transfer function, values, radius: a ray's contribution depends on
+//! nothing but the opacities of its window.
 //!
-//! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, and some 36 bytes a brick of 512.
+//! The context is the ray's, not the neighbourhood's. Where few bricks changed, only rays that meet a change are walked, once
+//! through the former opacities, taking back what they contributed, and once through the new ones. A voxel beside a change keeps
+//! what the rays that lead away from it contributed, which walking all its rays would compute again, each with a window of
+//! segments before it. Bricks that had no value yet are computed anew; so is everything within reach of a change where more bricks changed
+//! than are kept ([`PastBricks`]). Engine of the test data, 26 rays, R = 20 voxels, llvmpipe, before and after, full update and clip update
+//! in ms: sphere moved one voxel 590 and 191, 511 and 86; to a new place 600 and 300, 511 and 173.
+//!
+//! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, an eighth for what was, and some 50 bytes a brick of
+//! 512 with the lists of lines.
 
 use crate::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Recorder, Timings};
 use crate::method::volumes::volume_image;

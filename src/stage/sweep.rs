@@ -2,13 +2,15 @@
 //! `A_k(x) = S_k / (W − o/|v|)` with `(t, S) = head ∘ suffix ∘ prefix` of affine pairs, summed as
 //! `V_AO(x) = 1 − Σ_k w_k (1 − A_k(x))`, equal to evaluating each window directly ([`crate::cpu::sweep`]) up to rounding.
 //!
-//! A line and its reverse are walked together and added at once. In: `opacity` V_o (3D r16unorm, read as a storage image),
-//! `todo` (a u32 a brick), the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D r16unorm), only in bricks to do. Cost a voxel
-//! and line, that is for two directions: two reads of V_o (for n pieces 4 to 8 more each), two segments, four compositions, one
-//! read and write of V_AO; for R/8 segments one composition more in eight voxels.
+//! A line and its reverse are walked together. In: `opacity` V_o (3D r16unorm, read as a storage image), `todo` and `solid` of
+//! [`super::near`], the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D r16unorm), only in bricks to do. Cost a voxel and line,
+//! that is for two directions: two reads of V_o (for n pieces 4 to 8 more each), two segments, four compositions, one read and
+//! write of V_AO; for R/8 segments one composition more in eight voxels. Eight segments that meet no brick with opacity are not
+//! read, and a ray that nothing occludes writes nothing.
 //!
-//! Directions are summed in a fixed order, each line's contribution rounded to 1/65535 once, and full and partial updates run
-//! the same entry point of this one module: so they agree bit for bit.
+//! A ray's contribution is a whole number of 65535ths ([`crate::lattice::LatticeRays::parts`]), so V_AO is an exact sum in any order, and what
+//! a ray contributed can be taken back ([`Pass::TakeBack`]) by walking it through the opacities as they were. Every pass runs the same
+//! entry point of this one module: so full and partial updates agree bit for bit.
 //!
 //! Variants tried, in ns of processor time a voxel and direction, least of 2 or 3 (AMD EPYC, 2 cores, llvmpipe of Mesa
 //! 25.0.7, LLVM 15, 256 bit; 128³ gyroid, 26w, one piece, R 20 unless said, other work on the machine, so ± 5 %):
@@ -27,7 +29,19 @@
 //! | … no guards: this one (R 50: 11.8) | 9.8 to 10.5 |
 //! | … arrays of a chunk declared outside the loop, so not cleared for each chunk | 9.9 beside 9.8 |
 //!
-//! So 4.9 to 5.3 ns on two cores, half of what it was. `benches/sweep_simd.rs`, segment rule, W = 20: 1.0 ns with AVX2 and
+//! Then on `builtin:engine:128`, all voxels, where about a third of the chunks meet no opacity:
+//!
+//! | variant | R 20 | R 50 |
+//! |---|---|---|
+//! | that one | 11.7 | 12.1 |
+//! | … chunks without opacity neither read nor integrated, unoccluded rays write nothing; tiles of 8×4: this one | 8.4 | 10.2 |
+//! | … segments of `lead` not kept in arrays but branched over one by one | 8.4 | |
+//! | … gaps as a branch over what is assigned before it | 8.4 | |
+//!
+//! A chunk's machine code is some 16,000 instructions, a third of which move values to and from the stack: a call for each of
+//! 48 texels saves every vector register.
+//!
+//! So 4.2 to 5.3 ns on two cores, well below half of what it was. `benches/sweep_simd.rs`, segment rule, W = 20: 1.0 ns with AVX2 and
 //! 0.6 ns with AVX-512 at best on two cores (medians 1.8 and 0.8); the wanted factor of 2 is not reached.
 //!
 //! Of 11.4 ns with guards, what taking a part out saves: pairs of segments 3.9, V_AO 2.9 (`todo` less than 0.4 of it), both
@@ -58,9 +72,11 @@ struct Params {
     start: f32,
     far: f32,
     share: f32,
+    advance: [i32; 3],
+    part: i32,
 }
 layout_check!(Params => shaders::sweep::SWEEP_PARAMS {
-    dims, axis, step, window, bricks, flags, tiles, list, pieces, depth, start, far, share
+    dims, axis, step, window, bricks, flags, tiles, list, pieces, depth, start, far, share, advance, part
 });
 
 /// Longest window of the kernel, in segments.
@@ -260,6 +276,8 @@ impl Sweep {
             depth: (walk.length_mm / f64::from(walk.pieces) / f64::from(reference_mm)) as f32,
             start: start as f32,
             far: (walk.segments - 1) as f32,
+            advance: [0, 1, 2].map(|i| walk.ray.step[i] % field.dims[i] as i32),
+            part: 8 / walk.ray.step.map(i32::abs).into_iter().max().unwrap_or(1),
             share: (f64::from(walk.parts) / (f64::from(walk.segments) - start)) as f32,
         };
         let binds = [
