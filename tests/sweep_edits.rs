@@ -80,7 +80,7 @@ impl Scene {
                 let smallest = self.volume.min_spacing() as f32;
                 let next = &mut self.setup;
                 match random.below(5) {
-                    0 => next.occlusion.radius_mm = random.between(0.0, 7.0) * smallest,
+                    0 => next.occlusion.radius_mm = random.between(0.0, 18.0) * smallest,
                     1 => {
                         next.occlusion.rays =
                             [RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50][pick(random, 4)]
