@@ -114,7 +114,7 @@ fn stages(criterion: &mut Criterion) {
     swept.occlusion.rays = RaySet::W26;
     set(&mut bench, swept);
     bench.stage("sweep 26w", "sweep", |renderer, _| renderer.invalidate());
-    for stage in ["carve", "choose"] {
+    for stage in ["carve", "choose", "amend"] {
         bench.stage(stage, stage, |renderer, turn| {
             renderer.set_clips(&[sphere(to_and_fro(turn))]).expect("a clip");
         });
