@@ -1,7 +1,8 @@
 // Which bricks an edit concerns: those with voxels that need a value and within reach of a changed brick (method.md section 5).
 //
 // `spread` is one pass of a separable Euclidean distance transform over bricks, along one axis; the distance between two
-// bricks is that of their nearest voxels. After three passes `choose` decides.
+// bricks is that of their nearest voxels. After three passes `choose` decides: bricks that have values are amended, others, or
+// all where more changed than is kept, computed anew.
 
 struct NearParams {
     bricks: vec3<u32>,

@@ -12,6 +12,11 @@
 // Lines are walked along one axis, one voxel a step in every line, and wrap round along the other two: so lanes stay side by
 // side, all lines are equally long and together they meet each voxel once. Where a line leaves the volume (a gap) the window
 // goes on through free space, and the next line begins.
+//
+// What a ray contributes is a whole number, so that it can be taken back. To amend values only the chunks are walked whose rays meet
+// a change, through the former opacities and then through the new ones. There both rays over the same segments are told
+// apart, the one forwards from the voxel of `trail` and the one backwards from the voxel that `lead` reaches, for the other
+// rays of these voxels need not have changed. Chunks of either that meet no brick with opacity are not read.
 
 struct SweepParams {
     dims: vec3<u32>,
@@ -268,7 +273,8 @@ fn subtract(p: vec3<i32>, parts: f32) {
     textureStore(ambient, p, vec4((before - parts) / 65535.0, 0.0, 0.0, 0.0));
 }
 
-// Whether the next `size` segments from p stay inside the volume and meet no brick with opacity.
+// Whether the next `size` segments from p stay inside the volume and meet no brick with opacity, samples between lattice points
+// included: what these interpolate lies in the box of their segment. By V_o alone, so that a value is what it is.
 fn free_from(p: vec3<i32>, size: i32) -> bool {
     var solid_bits = 0u;
     for (var i = 0; i < size; i += params.part) {
