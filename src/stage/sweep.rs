@@ -37,6 +37,9 @@
 //! | … chunks without opacity neither read nor integrated, unoccluded rays write nothing; tiles of 8×4: this one | 8.4 | 10.2 |
 //! | … segments of `lead` not kept in arrays but branched over one by one | 8.4 | |
 //! | … gaps as a branch over what is assigned before it | 8.4 | |
+//! | … rays backwards in workgroup memory instead of a private array (16 KB a group, the most that every device has) | 8.7 | |
+//! | … the window a constant: 9.4 beside 9.8 for the 6 rays along the axes; a pipeline for every radius, so not kept | | |
+//! | … of the chunk before the first middle only the segments that it needs | 8.4 | |
 //!
 //! A chunk's machine code is some 16,000 instructions, a third of which move values to and from the stack: a call for each of
 //! 48 texels saves every vector register.
