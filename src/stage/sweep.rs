@@ -35,11 +35,10 @@
 //! |---|---|---|
 //! | that one | 11.7 | 12.1 |
 //! | … chunks without opacity neither read nor integrated, unoccluded rays write nothing; tiles of 8×4: this one | 8.4 | 10.2 |
-//! | … segments of `lead` not kept in arrays but branched over one by one | 8.4 | |
-//! | … gaps as a branch over what is assigned before it | 8.4 | |
-//! | … rays backwards in workgroup memory instead of a private array (16 KB a group, the most that every device has) | 8.7 | |
-//! | … the window a constant: 9.4 beside 9.8 for the 6 rays along the axes; a pipeline for every radius, so not kept | | |
-//! | … of the chunk before the first middle only the segments that it needs | 8.4 | |
+//! | … segments of `lead` not kept in arrays but branched over one by one | 8.9 to 9.2 beside 8.5 to 9.3 | |
+//! | … gaps as a branch over what is assigned before it | 8.6 to 9.1 beside 8.5 to 8.8 | |
+//! | … rays backwards in workgroup memory, not a private array (16 KB a group, the most that every device has) | 8.7 to 9.0 beside 8.4 to 8.7 | |
+//! | … the window a constant, the 6 rays along the axes: would need a pipeline for every radius | 9.2 to 9.5 beside 9.5 to 10.0 | |
 //!
 //! A chunk's machine code is some 16,000 instructions, a third of which move values to and from the stack: a call for each of
 //! 48 texels saves every vector register.
