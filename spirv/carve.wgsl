@@ -96,8 +96,9 @@ fn list_bricks(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgr
     }
     let slot = atomicAdd(&growing.count, 1u);
     growing.items[slot] = index;
-    atomicMax(&growing.groups_x, min(slot + 1u, GROUPS_PER_ROW));
-    atomicMax(&growing.groups_y, slot / GROUPS_PER_ROW + 1u);
+    let through = groups_through(slot);
+    atomicMax(&growing.groups_x, through.x);
+    atomicMax(&growing.groups_y, through.y);
 }
 
 fn value_of(voxel: vec3<u32>) -> f32 {
@@ -157,8 +158,7 @@ fn main(
             before[slice / 4u] = stored;
             if now != stored {
                 textureStore(opacity, voxel, vec4(f32(now) / 65535.0, 0.0, 0.0, 0.0));
-                let octant = inside / 4u;
-                atomicOr(&different, CHANGED << (octant.x + 2u * octant.y + 4u * octant.z));
+                atomicOr(&different, changed_bit(inside));
             }
             if now > 0u {
                 atomicOr(&found, contact_of(inside));
@@ -178,8 +178,9 @@ fn main(
         }
         if place < params.capacity {
             changed.items[place] = index;
-            atomicMax(&changed.groups_x, min(place + 1u, GROUPS_PER_ROW));
-            atomicMax(&changed.groups_y, place / GROUPS_PER_ROW + 1u);
+            let through = groups_through(place);
+            atomicMax(&changed.groups_x, through.x);
+            atomicMax(&changed.groups_y, through.y);
         }
     }
     workgroupBarrier();

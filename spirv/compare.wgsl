@@ -43,8 +43,7 @@ fn category_of(voxel: vec3<u32>) -> u32 {
     if params.by_brick == 0u {
         return textureLoad(mask, voxel, 0).r;
     }
-    let brick = voxel / 8u;
-    let listed = todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+    let listed = todo.brick[brick_index(voxel / 8u, params.bricks)];
     return select(UNTOUCHED, AFFECTED, (listed & TODO) != 0u);
 }
 

@@ -103,7 +103,7 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     for (var n = 0u; n < 8u; n++) {
         let beside = vec3(n & 1u, n >> 1u & 1u, n >> 2u);
         let at = own + beside;
-        if all(at < params.bricks) && contact.bits[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x] != 0u {
+        if all(at < params.bricks) && contact.bits[brick_index(at, params.bricks)] != 0u {
             // Every subset of axes that contains this one's.
             for (var s = n; s < 8u; s++) {
                 bits |= select(0u, 1u << s, (s & n) == n);
@@ -116,9 +116,7 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     for (var n = 0; n < 27; n++) {
         let place = vec3<i32>(own) + vec3(n % 3, n / 3 % 3, n / 9) - 1;
         if all(place >= vec3(0)) && all(place < vec3<i32>(params.bricks)) {
-            let at = vec3<u32>(place);
-            let bits = contact.bits[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
-            needed |= bits >> u32(26 - n) & 1u;
+            needed |= contact.bits[brick_index(vec3<u32>(place), params.bricks)] >> u32(26 - n) & 1u;
         }
     }
     // Octants that changed, by carve.wgsl.

@@ -261,8 +261,7 @@ fn subtract(p: vec3<i32>, parts: f32) {
     if parts == 0.0 && (params.flags & FIRST) == 0u {
         return;
     }
-    let brick = vec3<u32>(p) / 8u;
-    let word = todo.brick[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+    let word = todo.brick[brick_index(vec3<u32>(p) / 8u, params.bricks)];
     if (word & (TODO | ANEW)) != select(TODO | ANEW, TODO, (params.flags & AMEND) != 0u) {
         return;
     }
@@ -287,7 +286,7 @@ fn free_from(p: vec3<i32>, size: i32) -> bool {
         }
         let brick = vec3<u32>(low) / 8u;
         let passed = vec3<u32>(high) / 8u - brick;
-        let bits = solid.bits[(brick.z * params.bricks.y + brick.y) * params.bricks.x + brick.x];
+        let bits = solid.bits[brick_index(brick, params.bricks)];
         solid_bits |= bits >> (passed.x + 2u * passed.y + 4u * passed.z);
     }
     return (solid_bits & 1u) == 0u;

@@ -81,10 +81,9 @@ fn any_cell(box: Across, along: i32, axis: u32, dims: vec3<i32>) -> bool {
         for (var left = box.size.x; left > 0; ) {
             let columns = piece(u, extent.x);
             voxel[across.x] = u;
-            let at = vec3<u32>(voxel) / 8u;
-            let word = todo.brick[(at.z * params.bricks.y + at.y) * params.bricks.x + at.x];
-            let octant = vec3<u32>(voxel) / 4u & vec3(1u);
-            if (word & select(ANEW, CHANGED << (octant.x + 2u * octant.y + 4u * octant.z), params.amend == 1u)) != 0u {
+            let at = vec3<u32>(voxel);
+            let word = todo.brick[brick_index(at / 8u, params.bricks)];
+            if (word & select(ANEW, changed_bit(at), params.amend == 1u)) != 0u {
                 return true;
             }
             left -= columns;
@@ -162,8 +161,9 @@ fn first_wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i3
 fn add_run(direction: u32, run: Run) {
     let slot = atomicAdd(&list.head[direction].count, 1u);
     list.runs[list.head[direction].at + slot] = run;
-    atomicMax(&list.head[direction].groups_x, min(slot + 1u, GROUPS_PER_ROW));
-    atomicMax(&list.head[direction].groups_y, slot / GROUPS_PER_ROW + 1u);
+    let through = groups_through(slot);
+    atomicMax(&list.head[direction].groups_x, through.x);
+    atomicMax(&list.head[direction].groups_y, through.y);
 }
 
 // One invocation a tile and direction.

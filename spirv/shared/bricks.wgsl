@@ -18,6 +18,20 @@ const ANEW = 2u;
 const CHANGED = 256u;
 const ALL_CHANGED = 255u * CHANGED;
 
+fn changed_bit(voxel: vec3<u32>) -> u32 {
+    let octant = voxel / 4u & vec3(1u);
+    return CHANGED << (octant.x + 2u * octant.y + 4u * octant.z);
+}
+
+fn brick_index(brick: vec3<u32>, bricks: vec3<u32>) -> u32 {
+    return (brick.z * bricks.y + brick.y) * bricks.x + brick.x;
+}
+
+// Groups x, y of a dispatch that reaches the item in a slot.
+fn groups_through(slot: u32) -> vec2<u32> {
+    return vec2(min(slot + 1u, GROUPS_PER_ROW), slot / GROUPS_PER_ROW + 1u);
+}
+
 fn brick_at(index: u32, bricks: vec3<u32>) -> vec3<u32> {
     return vec3(index % bricks.x, index / bricks.x % bricks.y, index / (bricks.x * bricks.y));
 }

@@ -45,6 +45,7 @@ struct Head {
     at: u32,
 }
 layout_check!(Head => shaders::sweep_list::COUNTED_HEAD { groups_x, groups_y, groups_z, count, at });
+layout_check!(super::near::Chosen => shaders::sweep_list::BOUNDS { bricks, low, high });
 layout_check!(Head => shaders::sweep::SWEEP_HEAD { groups_x, groups_y, groups_z, count, at });
 
 /// Bytes of the head of one direction, which are first in the list; each begins with the arguments of an indirect dispatch.
