@@ -2,7 +2,9 @@
 
 mod common;
 
-use cao::volume::{self, Values, Volume, write_nrrd};
+use cao_formats::write_nrrd;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use flate2::{Compression, write::GzEncoder};
 use std::fs;
@@ -13,8 +15,8 @@ const EDGE: usize = 96;
 
 /// Values that compress about as well as a scan: a built-in volume's with two bits of noise.
 fn values() -> Vec<i16> {
-    let engine = volume::open(&format!("builtin:engine:{EDGE}")).expect("a built-in volume");
-    let mut random = cao::measure::random::Random::new(1);
+    let engine = cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a built-in volume");
+    let mut random = cao_measure::random::Random::new(1);
     (0..engine.len()).map(|i| 16 * engine.value(i) as i16 + random.below(4) as i16).collect()
 }
 
@@ -74,7 +76,7 @@ fn readers(criterion: &mut Criterion) {
     group.throughput(Throughput::Bytes(2 * EDGE.pow(3) as u64));
     for name in names {
         let path = folder.path().join(&name);
-        group.bench_function(&name, |b| b.iter(|| volume::read(&path).expect("a readable file")));
+        group.bench_function(&name, |b| b.iter(|| cao_formats::read(&path).expect("a readable file")));
     }
     let like = Volume::new([EDGE; 3], [1.0; 3], Values::I16(values())).expect("a volume");
     let ambient = vec![0.5; like.len()];
@@ -83,7 +85,7 @@ fn readers(criterion: &mut Criterion) {
         b.iter(|| write_nrrd(&target, &like, &ambient, "ambient factor").expect("a written file"));
     });
     group.bench_function("builtin", |b| {
-        b.iter(|| volume::open(&format!("builtin:engine:{EDGE}")).expect("a volume"));
+        b.iter(|| cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a volume"));
     });
     group.finish();
 }

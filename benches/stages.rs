@@ -4,12 +4,13 @@
 mod common;
 
 use cao::glam::Vec3;
-use cao::gpu::Timings;
 use cao::renderer::COLOUR;
 use cao::{
-    Clip, Gpu, Look, Method, OpenOptions, Pose, Quadrature, RaySet, Renderer, Setup, Shape, StereoRig,
+    Clip, Gpu, Method, OpenOptions, Pose, Quadrature, RaySet, Renderer, Setup, Shape, StereoRig,
     TransferFunction, TriangleMesh,
 };
+use cao_gpu::Timings;
+use cao_model::look::Look;
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::sync::Arc;
 use std::time::Duration;
@@ -56,10 +57,10 @@ fn sphere(x: f32) -> Clip {
 }
 
 fn stages(criterion: &mut Criterion) {
-    let volume = cao::volume::open(&format!("builtin:engine:{EDGE}")).expect("a volume");
-    let transfer = TransferFunction::load("auto", volume.range()).expect("a preset");
+    let volume = cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a volume");
+    let transfer = cao_formats::transfer::load("auto", volume.range()).expect("a preset");
     let gpu = Gpu::open(&OpenOptions::default()).expect("a Vulkan device");
-    let mut setup = Setup::paper(volume.min_spacing());
+    let mut setup = Setup::of(cao_model::methods::Method::Cao, volume.min_spacing());
     setup.method = Method::Cao;
     setup.occlusion.radius_mm = 8.0;
     let renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).expect("a renderer");

@@ -12,8 +12,8 @@ const EDGE: usize = 128;
 const RUNS: usize = 15;
 
 fn main() -> cao::Result<()> {
-    let volume = cao::volume::open(&format!("builtin:engine:{EDGE}"))?;
-    let transfer = cao::TransferFunction::load("auto", volume.range())?;
+    let volume = cao_formats::open(&format!("builtin:engine:{EDGE}"))?;
+    let transfer = cao::cao_formats::transfer::load("auto", volume.range())?;
     let q: Vec<f32> = (0..volume.len()).map(|i| 1.0 - transfer.opacity_at(volume.value(i) as f32)).collect();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let rays = RaySet::W26.directions();

@@ -2,10 +2,11 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::Access;
-use cao::measure::random::Random;
-use cao::stage::brick_distance::BrickDistance;
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::Access;
+use cao_measure::random::Random;
+use cao::draw::brick_distance::BrickDistance;
 use common::*;
 
 /// "There is none", as the kernel writes it.
@@ -29,7 +30,7 @@ fn distances_are_those_of_the_twin() {
     for grid in GRIDS.into_iter().chain(large) {
         let field = blank(&gpu, &grid);
         let kernel = BrickDistance::new(&gpu, &field).unwrap();
-        let bricks = cpu::bricks::bricks(&grid);
+        let bricks = twin::field::bricks::bricks(&grid);
         for turn in 0..5 {
             // From all bricks to none with opacity; clips hide one half in a plane.
             let share = [1, 2, 10, 60, u64::MAX][turn];
@@ -61,8 +62,8 @@ fn distances_are_those_of_the_twin() {
             let left: Vec<bool> = (0..bricks.len())
                 .map(|brick| opaque[brick] && !above(brick).all(|b| codes[b] == HIDDEN))
                 .collect();
-            let to_opacity = cpu::brick_distance::brick_distance(&bricks, &opaque);
-            let to_left = cpu::brick_distance::brick_distance(&bricks, &left);
+            let to_opacity = twin::draw::brick_distance::brick_distance(&bricks, &opaque);
+            let to_left = twin::draw::brick_distance::brick_distance(&bricks, &left);
             for (brick, &word) in found.iter().enumerate() {
                 let far = |distance: Option<usize>| distance.map_or(FAR, |d| d as u32);
                 // Of a brick that is hidden whole the code does not say by which.

@@ -2,12 +2,13 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Gpu};
-use cao::measure::random::Random;
-use cao::method::volumes::volume_image;
-use cao::stage::bricks::{BrickList, Bricks, Which};
-use cao::stage::field::Field;
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Gpu};
+use cao_measure::random::Random;
+use cao::cast::volumes::volume_image;
+use cao::field::bricks::{BrickList, Bricks, Which};
+use cao::field::Field;
 use common::*;
 
 const CLIPPED: u8 = 0;
@@ -44,11 +45,11 @@ fn list(
 }
 
 fn bricks_where(grid: &Grid, wanted: impl Fn([usize; 3]) -> bool) -> Vec<u32> {
-    let bricks = cpu::bricks::bricks(grid);
+    let bricks = twin::field::bricks::bricks(grid);
     let mut marked = vec![false; bricks.len()];
     for i in 0..grid.len() {
         let voxel = grid.voxel(i);
-        marked[bricks.index(voxel.map(|c| c / cpu::bricks::EDGE))] |= wanted(voxel);
+        marked[bricks.index(voxel.map(|c| c / twin::field::bricks::EDGE))] |= wanted(voxel);
     }
     (0..bricks.len() as u32).filter(|&b| marked[b as usize]).collect()
 }
@@ -113,7 +114,7 @@ fn each_wanted_brick_is_listed_once_and_no_other() {
             assert_eq!(groups, [expected.len() as u32, some, 1], "{context}");
             assert_eq!(marks, (0..count).map(|b| u32::from(now(&b))).collect::<Vec<_>>(), "{context}");
             // Every voxel that the twin computes is in a listed brick.
-            for brick in cpu::bricks::to_compute(&grid, &mask) {
+            for brick in twin::field::bricks::to_compute(&grid, &mask) {
                 assert!(found.binary_search(&(brick as u32)).is_ok(), "{context}: brick {brick}");
             }
         }
@@ -131,8 +132,8 @@ fn more_bricks_than_a_row_of_groups_are_all_listed() {
     // Listing all bricks reads no voxel: the images may be small.
     let small = Grid { dims: [1, 1, 1], spacing: [1.0; 3] };
     let mut field = blank(&gpu, &small);
-    let opacity = volume_image(&gpu, "opacity", &field, cao::gpu::Format::R32Float).unwrap();
-    let mask = volume_image(&gpu, "mask", &field, cao::gpu::Format::R8Uint).unwrap();
+    let opacity = volume_image(&gpu, "opacity", &field, cao_gpu::Format::R32Float).unwrap();
+    let mask = volume_image(&gpu, "mask", &field, cao_gpu::Format::R8Uint).unwrap();
     field.dims = [8 * 300, 8 * 300, 8];
     let count = field.brick_count();
     assert!(count > ROW);

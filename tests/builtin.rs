@@ -1,8 +1,9 @@
 //! Built-in volumes: the same everywhere, at any size, with what they promise in them.
 
 use cao::Error;
-use cao::volume::builtin::{NAMES, builtin, builtin_box, from_spec};
-use cao::volume::{Values, Volume};
+use cao_model::builtin::{NAMES, builtin, builtin_box, from_spec};
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 
 /// FNV-1a over the stored bytes, little-endian.
 fn fingerprint(volume: &Volume) -> u64 {

@@ -3,14 +3,14 @@
 mod cli_support;
 mod common;
 
-use cao::measure::chart::peers::Peers;
-use cao::measure::chart::{Chart, Plan, Scene, csv, draw, measure, report};
-use cao::measure::contender::{BASELINE, Change, State};
-use cao::measure::reference;
-use cao::occlusion::Quadrature;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
-use cao::volume::builtin::builtin;
+use cao_measure::chart::peers::Peers;
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, measure, report};
+use cao_measure::contender::{BASELINE, Change, State};
+use cao_measure::reference;
+use cao_model::occlusion::Quadrature;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+use cao_model::builtin::builtin;
 use cli_support::Folder;
 use common::{close, open};
 use std::collections::BTreeMap;
@@ -154,7 +154,7 @@ fn errors_are_in_the_order_that_the_methods_promise(chart: &Chart) {
     for point in chart.scenes.iter().flat_map(|scene| &scene.points) {
         let scene = chart.scenes.iter().find(|s| s.points.iter().any(|p| std::ptr::eq(p, point))).unwrap();
         let other = |method: &str, name: &str| {
-            let same = |p: &&cao::measure::chart::Point| {
+            let same = |p: &&cao_measure::chart::Point| {
                 p.change == point.change && p.method == method && p.setting.name() == name
             };
             scene.points.iter().find(same).unwrap_or_else(|| panic!("{method} {name}"))

@@ -2,19 +2,22 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::cpu::classify::{CLIPPED, UNTOUCHED, sample_positions};
-use cao::cpu::clips::{ClipField, Dilation, Maps, MeshLayers, NO_BACK, NO_FRONT, visible};
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Format, Gpu};
-use cao::measure::random::Random;
-use cao::method::volumes::volume_image;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::stage::classify::{AntiAliasing, Classify};
-use cao::stage::clip_bricks::ClipBricks;
-use cao::stage::clips::{ClipSet, MapSettings};
-use cao::stage::dilate::Dilate;
-use cao::stage::peel::Peel;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_twin::clip::classify::{CLIPPED, UNTOUCHED, sample_positions};
+use cao_twin::clip::clips::{ClipField, Dilation, Maps, MeshLayers, NO_BACK, NO_FRONT, visible};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Format, Gpu};
+use cao_measure::random::Random;
+use cao::cast::volumes::volume_image;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::AntiAliasing;
+use cao::clip::classify::Classify;
+use cao::clip::clip_bricks::ClipBricks;
+use cao::clip::clips::ClipSet;
+use cao_model::settings::MapSettings;
+use cao::clip::dilate::Dilate;
+use cao::clip::peel::Peel;
 use common::*;
 use glam::Vec3;
 
@@ -125,9 +128,9 @@ impl<'a> Bench<'a> {
                     back: pairs.map(|k| map(2 * k + 1, NO_BACK)).collect(),
                 };
                 twin.dilated = if maps.literal {
-                    cpu::dilate::literal(&twin.layers, clip.mode, field.radius_mm, false)
+                    twin::clip::dilate::literal(&twin.layers, clip.mode, field.radius_mm, false)
                 } else {
-                    cpu::dilate::conservative(&twin.layers, clip.mode, field.radius_mm, cells).unwrap()
+                    twin::clip::dilate::conservative(&twin.layers, clip.mode, field.radius_mm, cells).unwrap()
                 };
             }
             field
@@ -188,7 +191,7 @@ fn compare(
     found: &Found,
     context: &str,
 ) -> usize {
-    let (opacity, mask) = cpu::classify::classify(grid, full, clips, more);
+    let (opacity, mask) = twin::clip::classify::classify(grid, full, clips, more);
     let positions = sample_positions(more);
     let mut undecided = 0;
     for i in 0..grid.len() {

@@ -3,7 +3,8 @@
 
 mod cli_support;
 
-use cao::volume::{Volume, read};
+use cao_model::volume::Volume;
+use cao_formats::read;
 use cli_support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 

@@ -3,22 +3,26 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::cpu::clip_bricks::{Brick, Share};
-use cao::cpu::clips::{ClipField, Dilation, Maps};
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Buffer, Format, Gpu, Image};
-use cao::measure::exactness;
-use cao::measure::random::Random;
-use cao::method::volumes::volume_image;
-use cao::occlusion::Occlusion;
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::stage::classify::{AntiAliasing, Classify};
-use cao::stage::clip_bricks::{ClipBricks, UNKNOWN};
-use cao::stage::clips::{ClipSet, MapSettings};
-use cao::stage::dilate::Dilate;
-use cao::stage::field::Field;
-use cao::stage::peel::Peel;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_twin::clip::clip_bricks::{Brick, Share};
+use cao_twin::clip::clips::{ClipField, Dilation, Maps};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Buffer, Format, Gpu, Image};
+use cao_measure::exactness;
+use cao_measure::random::Random;
+use cao::cast::volumes::volume_image;
+use cao_model::occlusion::Occlusion;
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::settings::AntiAliasing;
+use cao::clip::classify::Classify;
+use cao::clip::clip_bricks::{ClipBricks, UNKNOWN};
+use cao::clip::clips::ClipSet;
+use cao_model::settings::MapSettings;
+use cao::clip::dilate::Dilate;
+use cao::field::Field;
+use cao::clip::peel::Peel;
 use common::*;
 use glam::Vec3;
 
@@ -149,7 +153,7 @@ fn what_is_said_of_a_brick_holds_for_each_of_its_samples() {
                 let twins = clips
                     .each_ref()
                     .map(|clip| ClipField::new(clip, &grid, reach.reach(grid.min_spacing()), &maps).unwrap());
-                let truth = cpu::clip_bricks::clip_bricks(&grid, &twins, 32);
+                let truth = twin::clip::clip_bricks::clip_bricks(&grid, &twins, 32);
                 let found = words(&gpu, &bench.bricks(&scene));
                 assert_eq!(found.len(), truth.len());
                 for (brick, (&word, truth)) in found.iter().zip(&truth).enumerate() {
@@ -200,7 +204,7 @@ fn classification_by_bricks_is_the_same_bit_for_bit() {
     let mut cases: Vec<(Grid, Vec<Clip>, MapSettings)> = Vec::new();
     for grid in GRIDS.into_iter().chain(LARGE) {
         let volume = volume_of(&grid, vec![0.0; grid.len()]);
-        let setup = Setup::paper(grid.min_spacing());
+        let setup = Setup::of(cao_model::methods::Method::Cao, grid.min_spacing());
         let renderer = Renderer::new(&gpu, &volume, identity(), setup, COLOUR).unwrap();
         for shape in shapes() {
             cases.push((grid, vec![random_clip(&mut random, &shape, size_mm(&grid))], MAPS));

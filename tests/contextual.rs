@@ -2,17 +2,18 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::cpu;
-use cao::cpu::Grid;
-use cao::gpu::Gpu;
-use cao::measure::random::Random;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::classify::AntiAliasing;
-use cao::stage::clips::MapSettings;
-use cao::stage::lao::Scope;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::Gpu;
+use cao_measure::random::Random;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::MapSettings;
+use cao_model::settings::Scope;
 use common::*;
 use glam::Vec3;
 
@@ -40,8 +41,8 @@ fn check(renderer: &Renderer, grid: &Grid, full: &[f32], context: &str) -> [usiz
     let Setup { occlusion, .. } = *renderer.setup();
     let reference = grid.min_spacing();
     let (opacity, mask) = (renderer.read_opacity().unwrap(), renderer.read_mask().unwrap());
-    let unclipped = cpu::lao::lao(grid, full, &occlusion, reference);
-    let expected = cpu::contextual::contextual(grid, &opacity, &unclipped, &mask, &occlusion, reference);
+    let unclipped = twin::cast::lao::lao(grid, full, &occlusion, reference);
+    let expected = twin::cast::contextual::contextual(grid, &opacity, &unclipped, &mask, &occlusion, reference);
     let found = renderer.read_ambient().unwrap();
     let tolerance = tolerance(renderer.gpu(), &occlusion, grid.min_spacing());
     for i in 0..grid.len() {

@@ -3,13 +3,13 @@
 
 mod common;
 
-use cao::clip::{ClipCamera, Mode};
-use cao::cpu;
-use cao::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
-use cao::gpu::{BufferUse, Gpu};
-use cao::measure::random::Random;
-use cao::stage::clips::MeshClip;
-use cao::stage::dilate::Dilate;
+use cao_model::clip::{ClipCamera, Mode};
+use cao_twin as twin;
+use cao_twin::clip::clips::{MeshLayers, NO_BACK, NO_FRONT};
+use cao_gpu::{BufferUse, Gpu};
+use cao_measure::random::Random;
+use cao::clip::clips::MeshClip;
+use cao::clip::dilate::Dilate;
 use common::*;
 use glam::Vec3;
 
@@ -119,9 +119,9 @@ fn each_pair_is_dilated_as_the_twin_does_it() {
                             let layers = pair_of(&layers, camera, pair);
                             let mode = if keep { Mode::Keep } else { Mode::Remove };
                             let expected = if literal {
-                                cpu::dilate::literal(&layers, mode, radius, false)
+                                twin::clip::dilate::literal(&layers, mode, radius, false)
                             } else {
-                                cpu::dilate::conservative(&layers, mode, radius, cells).unwrap()
+                                twin::clip::dilate::conservative(&layers, mode, radius, cells).unwrap()
                             };
                             let size = (cells * cells) as usize;
                             let map = |side: usize| &found[(2 * pair as usize + side) * size..][..size];

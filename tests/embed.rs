@@ -3,22 +3,23 @@
 
 mod gpu_support;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse};
-use cao::mesh::TriangleMesh;
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::eyes::Look;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
-use cao::volume;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse};
+use cao_model::mesh::TriangleMesh;
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::look::Look;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+
 use glam::Vec3;
 use std::sync::Arc;
 
 fn renderer(gpu: &Gpu, method: Method) -> Renderer {
-    let volume = volume::open("builtin:engine:24").unwrap();
+    let volume = cao_formats::open("builtin:engine:24").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let setup = Setup { method, ..Setup::paper(volume.min_spacing()) };
+    let setup = Setup { method, ..Setup::of(cao_model::methods::Method::Cao, volume.min_spacing()) };
     Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap()
 }
 
@@ -83,7 +84,7 @@ fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
 
     let (drawn, _) = r.draw(&views, &Look::default(), size).unwrap();
     let bytes = u64::from(size[0] * size[1]) * 16;
-    let back = gpu.buffer("back", bytes, cao::gpu::BufferUse::Readback).unwrap();
+    let back = gpu.buffer("back", bytes, cao_gpu::BufferUse::Readback).unwrap();
     for eye in 0..2 {
         let mut rec = gpu.recorder("read").unwrap();
         rec.copy_image_to_buffer(&colour, eye, [0; 3], [size[0], size[1], 1], &back, 0).unwrap();

@@ -3,24 +3,25 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::gpu::Gpu;
-use cao::measure::exactness;
-use cao::measure::random::Random;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::bricks::{BrickList, Bricks, Which};
-use cao::stage::classify::AntiAliasing;
-use cao::stage::clips::MapSettings;
-use cao::stage::compare::{Compare, Difference, Recomputed};
-use cao::stage::eyes::Look;
-use cao::stage::field::Field;
-use cao::stage::lao::Scope;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
-use cao::volume::Volume;
-use cao::volume::builtin::{NAMES, builtin_box};
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_gpu::Gpu;
+use cao_measure::exactness;
+use cao_measure::random::Random;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao::field::bricks::{BrickList, Bricks, Which};
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::MapSettings;
+use cao::verify::compare::{Compare, Difference, Recomputed};
+use cao_model::look::Look;
+use cao::field::Field;
+use cao_model::settings::Scope;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+use cao_model::volume::Volume;
+use cao_model::builtin::{NAMES, builtin_box};
 use common::*;
 use glam::Vec3;
 

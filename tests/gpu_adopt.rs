@@ -4,12 +4,14 @@ mod gpu_support;
 
 use ash::vk;
 use cao::Error;
-use cao::clip::{Clip, Shape};
-use cao::gpu::{Access::*, Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, ValidationLog};
-use cao::renderer::{Renderer, Setup};
-use cao::stage::eyes::Look;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
+use cao_model::clip::{Clip, Shape};
+use cao_gpu::Access::*;
+use cao_gpu::{Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, ValidationLog};
+use cao::renderer::Renderer;
+use cao_model::settings::Setup;
+use cao_model::look::Look;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
 use gpu_support::{bind, compile};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -161,7 +163,7 @@ fn a_host_keeps_its_handles_and_its_queue() {
     // SAFETY: as above.
     let mut rec = unsafe { gpu.record_into(commands[1]) };
     rec.stage("second").unwrap();
-    let copy = |rec: &mut cao::gpu::Recorder| rec.copy_buffer(&x, 0, &back, 0, 4 * 13);
+    let copy = |rec: &mut cao_gpu::Recorder| rec.copy_buffer(&x, 0, &back, 0, 4 * 13);
     assert!(matches!(copy(&mut rec), Err(Error::Hazard { problem }) if problem.contains("test.main")));
     rec.barrier(&[StorageWrite], &[TransferRead]);
     copy(&mut rec).unwrap();
@@ -207,9 +209,9 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
     };
     // SAFETY: the handles belong together, have what is required, and outlive `gpu`; the queue is used by this thread alone.
     let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
-    let volume = cao::volume::open("builtin:fruit:16").unwrap();
+    let volume = cao_formats::open("builtin:fruit:16").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let setup = Setup::paper(volume.min_spacing());
+    let setup = Setup::of(cao_model::methods::Method::Cao, volume.min_spacing());
     let clips = [Clip::remove(Shape::Torus)];
     let renderer = |gpu: &Gpu| {
         let mut renderer = Renderer::new(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();

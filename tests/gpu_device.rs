@@ -3,7 +3,7 @@
 mod gpu_support;
 
 use cao::Error;
-use cao::gpu::{BufferUse, Gpu, OpenOptions, Shader, shader};
+use cao_gpu::{BufferUse, Gpu, OpenOptions, Shader, shader};
 use gpu_support::{bind, close, compile, device_buffer, open};
 use std::process::Command;
 

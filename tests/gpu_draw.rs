@@ -2,10 +2,8 @@
 
 mod gpu_support;
 
-use cao::gpu::{
-    Access::*, Attachments, Bind, Blend, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image,
-    ImageDesc, ImageKind, ImageUse,
-};
+use cao_gpu::Access::*;
+use cao_gpu::{Attachments, Bind, Blend, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc, ImageKind, ImageUse};
 use gpu_support::{close, compile, open};
 
 /// One triangle that covers the picture's upper left half, counter-clockwise as seen, at the depth and in the colour of the immediates.

@@ -3,7 +3,8 @@
 mod gpu_support;
 
 use cao::Error;
-use cao::gpu::{Access::*, Bind, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, SamplerDesc};
+use cao_gpu::Access::*;
+use cao_gpu::{Bind, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, SamplerDesc};
 use gpu_support::{bind, close, compile, device_buffer, open, read_back};
 
 fn desc(format: Format) -> ImageDesc {

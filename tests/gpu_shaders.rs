@@ -2,7 +2,7 @@
 
 mod gpu_support;
 
-use cao::gpu::shader::Stage;
+use cao_gpu::shader::Stage;
 use gpu_support::compile::{Bounds, Options, file, files};
 use gpu_support::{bind, close, compile_with, device_buffer, leak, open, read_back};
 use std::path::Path;

@@ -4,10 +4,8 @@
 mod gpu_support;
 
 use cao::Error;
-use cao::gpu::{
-    Access, Access::*, Attachments, Bind, BufferUse, Format, Gpu, GraphicsDesc, Image, ImageDesc, ImageKind,
-    ImageUse, Recorder,
-};
+use cao_gpu::{Access, Attachments, Bind, BufferUse, Format, Gpu, GraphicsDesc, Image, ImageDesc, ImageKind, ImageUse, Recorder};
+use cao_gpu::Access::*;
 use gpu_support::{bind, close, compile, device_buffer, open, read_back};
 
 const N: u32 = 37;

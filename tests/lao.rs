@@ -2,14 +2,15 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Format, Gpu, Image};
-use cao::measure::random::Random;
-use cao::method::lao;
-use cao::method::volumes::{Kernels, Settings, Volumes, volume_image};
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::stage::field::Field;
-use cao::stage::lao::Scope;
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Format, Gpu, Image};
+use cao_measure::random::Random;
+use cao::cast::full as lao;
+use cao::cast::volumes::{Kernels, Settings, Volumes, volume_image};
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::field::Field;
+use cao_model::settings::Scope;
 use common::*;
 
 /// How far a sample's position may be off, in voxels a voxel of the volume's longest axis: normalised coordinates up to 1
@@ -142,7 +143,7 @@ fn every_ray_set_and_rule_at_every_length_and_size() {
                     turn += 1;
                     let settings =
                         Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
-                    let expected = cpu::lao::lao(grid, &opacity, &occlusion, reference_mm);
+                    let expected = twin::cast::lao::lao(grid, &opacity, &occlusion, reference_mm);
                     let tolerance = tolerance(&gpu, grid, &occlusion, reference_mm, LARGEST.into());
                     let context = format!("{occlusion:?}");
                     compare(grid, &bench.run(&image, &settings), &expected, tolerance, &context);
@@ -190,7 +191,7 @@ fn opaque_blocks() {
             };
             let reference_mm = grid.min_spacing();
             let settings = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
-            let expected = cpu::lao::lao(grid, &opacity, &occlusion, reference_mm);
+            let expected = twin::cast::lao::lao(grid, &opacity, &occlusion, reference_mm);
             let found = bench.run(&image, &settings);
             let mut tolerance = tolerance(&gpu, grid, &occlusion, reference_mm, 1.0);
             if quadrature == Quadrature::Segment {

@@ -2,20 +2,21 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::gpu::Gpu;
-use cao::mesh::TriangleMesh;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::classify::AntiAliasing;
-use cao::stage::clips::MapSettings;
-use cao::stage::eyes::Look;
-use cao::stage::lao::Scope;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
-use cao::volume::Volume;
-use cao::volume::builtin::builtin_box;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_gpu::Gpu;
+use cao_model::mesh::TriangleMesh;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::MapSettings;
+use cao_model::look::Look;
+use cao_model::settings::Scope;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+use cao_model::volume::Volume;
+use cao_model::builtin::builtin_box;
 use common::*;
 use glam::Vec3;
 use std::sync::Arc;

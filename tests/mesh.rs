@@ -1,7 +1,7 @@
 //! Meshes: what comes out of an OBJ file, and what is refused as a clip shape.
 
 use cao::Error;
-use cao::mesh::TriangleMesh;
+use cao_model::mesh::TriangleMesh;
 use glam::Vec3;
 use proptest::prelude::*;
 
@@ -44,7 +44,7 @@ fn generators_are_closed_and_outward_with_their_known_volume() {
 fn seams_of_texture_and_normal_indices_are_welded() {
     let text = "mtllib nowhere.mtl\no solid\nv 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv -0 0 -0.0\nvt 0 0\nvn 0 0 1\n\
                 usemtl red\ns off\nf 1/1/1 3/1/1 2/1/1\ng part\nf 5//1 2//1 4//1\nf 2 3 4\nf -1 -2 -3 # comment\n";
-    let mesh = TriangleMesh::parse_obj("seams.obj", text).unwrap();
+    let mesh = cao_formats::obj::parse("seams.obj", text).unwrap();
     assert_eq!((mesh.vertices.len(), mesh.triangles.len()), (4, 4));
     // The last face is (5, 4, 3): the tetrahedron closes through the vertex that is vertex 1 again.
     mesh.closed().unwrap();
@@ -55,14 +55,14 @@ fn seams_of_texture_and_normal_indices_are_welded() {
 fn polygons_become_triangles_and_continued_lines_are_read() {
     let text = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
                 f 4 3 2 1\nf 5 6 7 8\nf 1 2 \\\n 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\nl 1 2\np 3\nf 1 2\n";
-    let mesh = TriangleMesh::parse_obj("cube.obj", text).unwrap();
+    let mesh = cao_formats::obj::parse("cube.obj", text).unwrap();
     assert_eq!(mesh.triangles.len(), 12);
     assert!((mesh.outward().unwrap().signed_volume() - 8.0).abs() < ROUNDING);
 }
 
 #[test]
 fn collapsed_triangles_are_dropped_and_counted_and_leave_the_mesh_closed() {
-    let mesh = TriangleMesh::parse_obj(
+    let mesh = cao_formats::obj::parse(
         "thin.obj",
         &format!("{TETRAHEDRON}v 0 0 0\nv 9 9 9\nf 1 5 2\nf 1 1 3\nf 6 6 6\n"),
     );
@@ -94,7 +94,7 @@ fn inconsistent_winding_is_refused_with_count() {
 #[test]
 fn edges_of_more_than_two_triangles_are_refused() {
     let fin = format!("{TETRAHEDRON}v 0 -1 -1\nf 1 2 5\n");
-    let found = message(TriangleMesh::parse_obj("fin.obj", &fin).unwrap().closed());
+    let found = message(cao_formats::obj::parse("fin.obj", &fin).unwrap().closed());
     assert!(
         found.contains("2 edges are open") && found.contains("1 edge is shared by more than two"),
         "{found}"
@@ -137,7 +137,7 @@ fn inside_out_meshes_are_turned_and_cavities_stay_cavities() {
 #[test]
 fn flat_meshes_are_refused() {
     // Two triangles back to back: closed, and nothing in between.
-    let flat = TriangleMesh::parse_obj("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n").unwrap();
+    let flat = cao_formats::obj::parse("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n").unwrap();
     flat.closed().unwrap();
     assert!(message(flat.outward()).contains("encloses no volume"));
 }
@@ -146,7 +146,7 @@ fn flat_meshes_are_refused() {
 fn wrong_files_are_refused_with_file_and_line() {
     let dir = tempfile::tempdir().unwrap();
     let missing = dir.path().join("missing.obj");
-    let found = TriangleMesh::load_obj(&missing).unwrap_err();
+    let found = cao_formats::obj::load(&missing).unwrap_err();
     assert!(matches!(found, Error::Io { .. }) && found.to_string().contains("missing.obj"), "{found}");
     for (text, expected) in [
         ("", "has no faces"),
@@ -167,7 +167,7 @@ fn wrong_files_are_refused_with_file_and_line() {
     ] {
         let path = dir.path().join("wrong.obj");
         std::fs::write(&path, text).unwrap();
-        let found = message(TriangleMesh::load_obj(&path));
+        let found = message(cao_formats::obj::load(&path));
         assert!(found.contains("wrong.obj") && found.contains(expected), "{text:?}: {found}");
     }
 }
@@ -182,7 +182,7 @@ proptest! {
     /// Nothing in an OBJ file can make the reader panic, and what it accepts is sound.
     #[test]
     fn any_text_is_read_or_refused(lines in prop::collection::vec("(v|f|vt|vn|o|usemtl|mtllib|#)?( -?[0-9]{1,20}(/[0-9]{0,20}){0,3}| nan| x|\\\\){0,5}", 0..12)) {
-        if let Ok(mesh) = TriangleMesh::parse_obj("any.obj", &lines.join("\n")) {
+        if let Ok(mesh) = cao_formats::obj::parse("any.obj", &lines.join("\n")) {
             prop_assert!(!mesh.triangles.is_empty());
             prop_assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()));
             prop_assert!(mesh.vertices.iter().all(|v| v.is_finite()));

@@ -2,14 +2,15 @@
 
 mod common;
 
-use cao::cpu::carve::contact;
-use cao::cpu::near::near;
-use cao::cpu::{Grid, bricks::bricks};
-use cao::gpu::BufferUse;
-use cao::measure::random::Random;
-use cao::stage::lao::Scope;
-use cao::stage::near::{ANEW, Bindings, CHANGED, Chosen, FAR, Near, TODO};
-use cao::stage::past::PastBricks;
+use cao_twin::sweep::carve::contact;
+use cao_twin::sweep::near::near;
+use cao_twin::Grid;
+use cao_twin::field::bricks::bricks;
+use cao_gpu::BufferUse;
+use cao_measure::random::Random;
+use cao_model::settings::Scope;
+use cao::sweep::near::{ANEW, Bindings, CHANGED, Chosen, FAR, Near, TODO};
+use cao::sweep::past::PastBricks;
 use common::*;
 
 #[test]
@@ -82,7 +83,7 @@ fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
                 assert_eq!((&summary.low[at..at + 3], &summary.high[at..at + 3]), (&low[..], &high[..]));
             }
             let found: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &solid));
-            assert_eq!(found, cao::cpu::near::solid(grid, &opacity), "{grid:?} turn {turn}");
+            assert_eq!(found, cao::twin::sweep::near::solid(grid, &opacity), "{grid:?} turn {turn}");
             let has: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &valued));
             let needed = near(grid, &opacity, &vec![true; all], f64::INFINITY, scope == Scope::All);
             assert_eq!(has, needed.into_iter().map(u32::from).collect::<Vec<_>>(), "{grid:?} turn {turn}");

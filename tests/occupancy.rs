@@ -2,14 +2,16 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, BufferUse, Gpu};
-use cao::measure::random::Random;
-use cao::stage::field::Field;
-use cao::stage::occupancy::Occupancy;
-use cao::stage::transfer::TransferBuffer;
-use cao::transfer::TransferFunction;
-use cao::volume::{Values, Volume};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, BufferUse, Gpu};
+use cao_measure::random::Random;
+use cao::field::Field;
+use cao::field::occupancy::Occupancy;
+use cao::field::transfer::TransferBuffer;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use common::*;
 
 fn on_device(gpu: &Gpu, kernel: &Occupancy, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
@@ -27,7 +29,7 @@ fn on_device(gpu: &Gpu, kernel: &Occupancy, volume: &Volume, transfer: &Transfer
 
 fn twin(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
-    cpu::occupancy::occupancy(&grid_of(volume), &values, transfer)
+    twin::field::occupancy::occupancy(&grid_of(volume), &values, transfer)
 }
 
 fn opaque_between(low: f32, high: f32) -> TransferFunction {

@@ -2,14 +2,15 @@
 
 mod common;
 
-use cao::cpu;
-use cao::gpu::{Access, Gpu};
-use cao::method::volumes::Volumes;
-use cao::stage::field::Field;
-use cao::stage::opacity::Opacity;
-use cao::stage::transfer::TransferBuffer;
-use cao::transfer::TransferFunction;
-use cao::volume::{Values, Volume};
+use cao_twin as twin;
+use cao_gpu::{Access, Gpu};
+use cao::cast::volumes::Volumes;
+use cao::field::Field;
+use cao::field::opacity::Opacity;
+use cao::field::transfer::TransferBuffer;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use common::*;
 
 /// Rounding of a data value on the device, as a share of the texel type's range: a UNORM texel, the scale and the bias
@@ -45,7 +46,7 @@ fn white(opacity: &[[f32; 2]]) -> TransferFunction {
 }
 
 /// Integers of 8 and 16 bits fill their whole range; others lie around it.
-fn every_type(random: &mut cao::measure::random::Random, n: usize) -> Vec<(Values, f64)> {
+fn every_type(random: &mut cao_measure::random::Random, n: usize) -> Vec<(Values, f64)> {
     let mut bits = || (0..n).map(|_| random.bits()).collect::<Vec<_>>();
     let (a, b) = (bits(), bits());
     vec![
@@ -66,7 +67,7 @@ fn every_type(random: &mut cao::measure::random::Random, n: usize) -> Vec<(Value
 fn opacity_is_the_transfer_function_of_every_type_and_size() {
     let gpu = open();
     let kernel = Opacity::new(&gpu).unwrap();
-    let mut random = cao::measure::random::Random::new(1);
+    let mut random = cao_measure::random::Random::new(1);
     for (g, grid) in GRIDS.iter().enumerate() {
         for (values, range) in every_type(&mut random, grid.len()) {
             let mut volume = Volume::new(grid.dims, grid.spacing, values).unwrap();
@@ -85,7 +86,7 @@ fn opacity_is_the_transfer_function_of_every_type_and_size() {
                     * VALUE_ROUNDING
                     * (range * volume.slope.abs() + volume.intercept.abs())
                     + OPACITY_ROUNDING;
-                let expected = cpu::opacity::opacity(&volume, &transfer);
+                let expected = twin::field::opacity::opacity(&volume, &transfer);
                 let found = on_device(&gpu, &kernel, &volume, &transfer);
                 for i in 0..volume.len() {
                     let error = f64::from((found[i] - expected[i]).abs());
@@ -131,7 +132,7 @@ fn steps_fall_on_the_right_side_of_every_integer() {
                 })
                 .collect();
             let transfer = white(&points);
-            let expected = cpu::opacity::opacity(&volume, &transfer);
+            let expected = twin::field::opacity::opacity(&volume, &transfer);
             let found = on_device(&gpu, &kernel, &volume, &transfer);
             for i in 0..volume.len() {
                 assert!(

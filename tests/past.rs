@@ -2,11 +2,12 @@
 
 mod common;
 
-use cao::cpu::{Grid, bricks::bricks};
-use cao::gpu::Format;
-use cao::measure::random::Random;
-use cao::method::volumes::volume_image;
-use cao::stage::past::{Past, PastBricks};
+use cao_twin::Grid;
+use cao_twin::field::bricks::bricks;
+use cao_gpu::Format;
+use cao_measure::random::Random;
+use cao::cast::volumes::volume_image;
+use cao::sweep::past::{Past, PastBricks};
 use common::*;
 
 #[test]

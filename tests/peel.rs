@@ -2,13 +2,13 @@
 
 mod common;
 
-use cao::clip::ClipCamera;
-use cao::cpu;
-use cao::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
-use cao::gpu::Gpu;
-use cao::measure::random::Random;
-use cao::mesh::TriangleMesh;
-use cao::stage::peel::{Layers, MAX_PAIRS, Peel};
+use cao_model::clip::ClipCamera;
+use cao_twin as twin;
+use cao_twin::clip::clips::{MeshLayers, NO_BACK, NO_FRONT};
+use cao_gpu::Gpu;
+use cao_measure::random::Random;
+use cao_model::mesh::TriangleMesh;
+use cao::clip::peel::{Layers, MAX_PAIRS, Peel};
 use common::*;
 use glam::{Quat, Vec3};
 
@@ -47,7 +47,7 @@ fn compare(gpu: &Gpu, peel: &Peel, mesh: &TriangleMesh, scale: Vec3, resolution:
     assert_eq!((found.pairs, found.camera), (pairs, camera), "{context}");
     assert_eq!(found.depth.len(), (2 * pairs * resolution * resolution) as usize);
     let found = as_twin(&found);
-    let (expected, report) = cpu::peel::peel(mesh, scale, &camera, pairs as usize);
+    let (expected, report) = twin::clip::peel::peel(mesh, scale, &camera, pairs as usize);
     assert_eq!((report.open_pixels, report.unresolved_pixels), (0, 0), "{context}");
 
     let edge = resolution as usize;

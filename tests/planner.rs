@@ -4,21 +4,20 @@
 #[path = "common/mod.rs"]
 mod common;
 
-use cao::measure::planner::{
-    Budget, Calibration, Candidate, Measured, SAMPLES, TIME_FACTOR, calibrate, candidates, measure,
-};
-use cao::measure::random::Random;
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::lao::Scope;
+use cao_measure::planner::{Budget, Calibration, Candidate, Measured, SAMPLES, TIME_FACTOR, calibrate, candidates, measure};
+use cao_measure::random::Random;
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::settings::Scope;
 use cao::{Clip, Gpu, Pose, Shape, TransferFunction};
 use common::{close, open};
 use glam::Vec3;
 
 fn renderer(gpu: &Gpu, volume: &str, method: Method, scope: Scope) -> Renderer {
-    let volume = cao::volume::open(volume).unwrap();
-    let transfer = TransferFunction::load("auto", volume.range()).unwrap();
-    let mut setup = Setup { method, scope, ..Setup::paper(volume.min_spacing()) };
+    let volume = cao_formats::open(volume).unwrap();
+    let transfer = cao_formats::transfer::load("auto", volume.range()).unwrap();
+    let mut setup = Setup { method, scope, ..Setup::of(cao_model::methods::Method::Cao, volume.min_spacing()) };
     setup.occlusion.radius_mm = 8.0;
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap();
     let pose = Pose { translate_mm: Vec3::new(9.0, -9.0, 9.0), scale: Vec3::splat(11.0), ..Pose::default() };

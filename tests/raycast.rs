@@ -3,32 +3,37 @@
 
 mod common;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::cpu::clips::{ClipField, Dilation, Maps};
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
-use cao::measure::random::Random;
-use cao::method::volumes::Volumes;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use cao::scene::{Method, Shading};
-use cao::stage::brick_distance::BrickDistance;
-use cao::stage::classify::AntiAliasing;
-use cao::stage::clip_bricks::ClipBricks;
-use cao::stage::clips::{ClipSet, MapSettings};
-use cao::stage::dilate::Dilate;
-use cao::stage::eyes::{FrameBuffer, Look};
-use cao::stage::field::Field;
-use cao::stage::lao::Scope;
-use cao::stage::occupancy::Occupancy;
-use cao::stage::opacity::Opacity;
-use cao::stage::peel::Peel;
-use cao::stage::raycast::{Bindings, Raycast};
-use cao::stage::transfer::TransferBuffer;
-use cao::transfer::TransferFunction;
-use cao::view::{StereoRig, Tangents, View, with_insets};
-use cao::volume::Volume;
-use cao::volume::builtin::builtin_box;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_twin::clip::clips::{ClipField, Dilation, Maps};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao_measure::random::Random;
+use cao::cast::volumes::Volumes;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::look::Look;
+use cao::draw::brick_distance::BrickDistance;
+use cao_model::settings::AntiAliasing;
+use cao::clip::clip_bricks::ClipBricks;
+use cao::clip::clips::ClipSet;
+use cao_model::settings::MapSettings;
+use cao::clip::dilate::Dilate;
+use cao::draw::eyes::FrameBuffer;
+use cao_model::look::Look;
+use cao::field::Field;
+use cao_model::settings::Scope;
+use cao::field::occupancy::Occupancy;
+use cao::field::opacity::Opacity;
+use cao::clip::peel::Peel;
+use cao::draw::raycast::{Bindings, Raycast};
+use cao::field::transfer::TransferBuffer;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, Tangents, View, with_insets};
+use cao_model::volume::Volume;
+use cao_model::builtin::builtin_box;
 use common::*;
 use glam::{Quat, Vec3};
 
@@ -76,7 +81,7 @@ fn twin(
     clips: &[Clip],
     views: &[View; 2],
     look: &Look,
-) -> [cpu::raycast::Image; 2] {
+) -> [twin::draw::raycast::Image; 2] {
     let grid = grid_of(volume);
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
     let (opacity, ambient) = (renderer.read_opacity().unwrap(), renderer.read_ambient().unwrap());
@@ -84,7 +89,7 @@ fn twin(
     let maps = Maps { layers: 4, resolution: MAPS.resolution, dilation: Dilation::Conservative(MAPS.cells) };
     let fields: Vec<_> =
         clips.iter().map(|clip| ClipField::new(clip, &grid, reach, &maps).unwrap()).collect();
-    let frame = cpu::raycast::Frame {
+    let frame = twin::draw::raycast::Frame {
         grid,
         values: &values,
         transfer,
@@ -93,7 +98,7 @@ fn twin(
         ambient: &ambient,
         clips: &fields,
         step_mm: f64::from(look.step_mm.unwrap()),
-        shading: Shading {
+        shading: Look {
             ambient: look.ambient,
             diffuse: look.diffuse,
             light: look.light.normalize(),
@@ -101,7 +106,7 @@ fn twin(
             jitter: look.jitter,
         },
     };
-    [0, 1].map(|eye| cpu::raycast::raycast(&frame, &views[eye], SIZE.map(|s| s as usize)))
+    [0, 1].map(|eye| twin::draw::raycast::raycast(&frame, &views[eye], SIZE.map(|s| s as usize)))
 }
 
 fn assert_finite(image: &StereoImage, context: &str) {
@@ -115,7 +120,7 @@ fn assert_finite(image: &StereoImage, context: &str) {
 /// Compares both eyes; `nearest_mm` is the depth of the nearest thing that could be seen.
 fn compare(
     found: &StereoImage,
-    expected: &[cpu::raycast::Image; 2],
+    expected: &[twin::draw::raycast::Image; 2],
     views: &[View; 2],
     step: f32,
     nearest_mm: f32,

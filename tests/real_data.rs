@@ -5,14 +5,15 @@
 
 mod gpu_support;
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::occlusion::{Occlusion, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::stage::eyes::Look;
-use cao::stage::lao::Scope;
-use cao::transfer::TransferFunction;
-use cao::view::StereoRig;
-use cao::volume;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::occlusion::{Occlusion, RaySet};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::look::Look;
+use cao_model::settings::Scope;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+
 use glam::Vec3;
 use std::path::{Path, PathBuf};
 
@@ -40,12 +41,12 @@ fn find(name: &str) -> Option<PathBuf> {
 
 fn exact_and_visible(name: &str, preset: &str) {
     let Some(path) = find(name) else { return };
-    let volume = volume::read(&path).unwrap();
+    let volume = cao_formats::read(&path).unwrap();
     let transfer = TransferFunction::preset(preset, volume.range()).unwrap();
     let gpu = gpu_support::open();
     // Short rays and few of them: the software driver works on millions of voxels.
     let radius_mm = 4.0f32.max(2.0 * volume.min_spacing() as f32);
-    let paper = Setup::paper(volume.min_spacing());
+    let paper = Setup::of(cao_model::methods::Method::Cao, volume.min_spacing());
     let setup = Setup {
         occlusion: Occlusion { rays: RaySet::R6, radius_mm, ..paper.occlusion },
         scope: Scope::Needed,

@@ -2,18 +2,20 @@
 
 mod common;
 
-use cao::cpu::raycast::{Frame, Image, ambient_positions, raycast, raycast_lit};
-use cao::cpu::{self, Grid};
-use cao::gpu::Gpu;
-use cao::measure::error::{counting, errors};
-use cao::measure::random::Random;
-use cao::measure::reference::{self, Plan};
-use cao::occlusion::{Integral, Occlusion, Quadrature, RaySet};
-use cao::scene::Shading;
-use cao::stage::field::Field;
-use cao::stage::reference::{Points, Reference, upload_clearance};
-use cao::transfer::TransferFunction;
-use cao::view::{StereoRig, View};
+use cao_twin::draw::raycast::{Frame, Image, ambient_positions, raycast, raycast_lit};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::Gpu;
+use cao_measure::error::{counting, errors};
+use cao_measure::random::Random;
+use cao_measure::reference;
+use cao_measure::reference::Plan;
+use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_model::look::Look;
+use cao::field::Field;
+use cao_measure::kernels::reference::{Points, Reference, upload_clearance};
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, View};
 use common::*;
 use glam::Vec3;
 
@@ -62,9 +64,9 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
             Integral::ambient(0.0, 0.0, 8, 100, smallest),
         ] {
             let reference_mm = 1.3 * smallest;
-            let expected = cpu::reference::reference(&grid, &opacity, &integral, reference_mm, &with_rim);
+            let expected = twin::measure::reference::reference(&grid, &opacity, &integral, reference_mm, &with_rim);
             let longer = Integral { step_mm: 1.01 * integral.step_mm, ..integral };
-            let other = cpu::reference::reference(&grid, &opacity, &longer, reference_mm, &with_rim);
+            let other = twin::measure::reference::reference(&grid, &opacity, &longer, reference_mm, &with_rim);
             for filtered in [true, false] {
                 // Only software drivers filter in f32.
                 if filtered && filter_error(&gpu) > ROUNDING {
@@ -96,8 +98,8 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
 
 /// A built-in volume with soft and hard parts, as opacity.
 fn fruit(size: usize) -> (Grid, Vec<f32>) {
-    let volume = cao::volume::open(&format!("builtin:fruit:{size}")).unwrap();
-    let transfer = cao::transfer::TransferFunction::preset("auto", volume.range()).unwrap();
+    let volume = cao_formats::open(&format!("builtin:fruit:{size}")).unwrap();
+    let transfer = cao_model::transfer::TransferFunction::preset("auto", volume.range()).unwrap();
     let opacity = (0..volume.len()).map(|i| transfer.opacity_at(volume.value(i) as f32)).collect();
     (grid_of(&volume), opacity)
 }
@@ -174,7 +176,7 @@ fn the_papers_sum_converges_to_the_literal_reference() {
             step_mm: None,
         };
         let found: Vec<f32> =
-            cpu::lao::lao(&grid, &opacity, &settings, 1.0).into_iter().map(|a| a as f32).collect();
+            twin::cast::lao::lao(&grid, &opacity, &settings, 1.0).into_iter().map(|a| a as f32).collect();
         errors(&found, &to.ambient, &to.counts).rmse
     };
     let [six, many] = [RaySet::R6, RaySet::W50].map(|rays| error(rays, &literal));
@@ -196,7 +198,7 @@ const SIZE: [usize; 2] = [20, 16];
 
 impl Scene {
     fn new() -> Self {
-        let volume = cao::volume::open("builtin:fruit:16").unwrap();
+        let volume = cao_formats::open("builtin:fruit:16").unwrap();
         let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
         let opacity = values.iter().map(|v| transfer.opacity_at(*v)).collect();
@@ -215,7 +217,7 @@ impl Scene {
             ambient,
             clips: &[],
             step_mm,
-            shading: Shading { ambient: 0.3, diffuse: 0.3, light, occlusion: true, jitter: false },
+            shading: Look { ambient: 0.3, diffuse: 0.3, light, occlusion: true, jitter: false },
         }
     }
 
@@ -260,7 +262,7 @@ fn the_image_reference_is_the_ray_cast_with_the_integral_at_each_sample() {
     assert_eq!(found.covered, positions.iter().filter(|p| !p.is_empty()).count());
     assert!(found.covered > 30);
     let integral = Integral::ambient(RADIUS, 0.5, 4, 60, 1.0);
-    let evaluate = |p: &Vec<_>| cpu::reference::reference(&scene.grid, &scene.opacity, &integral, 1.0, p);
+    let evaluate = |p: &Vec<_>| twin::measure::reference::reference(&scene.grid, &scene.opacity, &integral, 1.0, p);
     let ambient: Vec<Vec<f64>> = positions.iter().map(evaluate).collect();
     let expected = raycast_lit(&fine, &scene.view, SIZE, &pixels, &ambient);
     assert!(apart(&found.image, &expected) < IMAGE_ROUNDING, "{}", apart(&found.image, &expected));

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use cao::Error;
-use cao::clip::{Mode, Shape};
-use cao::mesh::TriangleMesh;
-use cao::occlusion::{Quadrature, RaySet};
-use cao::scene::{Method, Scene, TransferSource, Viewpoint, VolumeSource};
+use cao_model::clip::{Mode, Shape};
+use cao_model::mesh::TriangleMesh;
+use cao_model::occlusion::{Quadrature, RaySet};
+use cao_model::methods::Method;
+use cao_formats::scene::{Scene, TransferSource, Viewpoint, VolumeSource};
 use glam::Vec3;
 
 const ENGINE: &str = "volume = \"builtin:engine:16\"\n";

@@ -2,15 +2,16 @@
 
 mod common;
 
-use cao::clip::{Clip, Pose, Shape};
-use cao::cpu::ssao::{Settings, ssao};
-use cao::gpu::{Access, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::stage::eyes::Look;
-use cao::stage::ssao::Ssao;
-use cao::transfer::TransferFunction;
-use cao::view::{StereoRig, View};
-use cao::volume::builtin::builtin_box;
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_twin::measure::ssao::{Settings, ssao};
+use cao_gpu::{Access, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::look::Look;
+use cao_measure::kernels::ssao::Ssao;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, View};
+use cao_model::builtin::builtin_box;
 use common::*;
 use glam::Vec3;
 
@@ -21,7 +22,7 @@ const SIZE: [u32; 2] = [90, 70];
 fn on_device(gpu: &Gpu, settings: Settings, azimuth: f32) -> ([View; 2], [Vec<f32>; 2], [Vec<f32>; 2]) {
     let volume = builtin_box("engine", [32, 28, 30], [1.0, 1.2, 0.9]).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let mut setup = Setup::paper(volume.min_spacing());
+    let mut setup = Setup::of(cao_model::methods::Method::Cao, volume.min_spacing());
     setup.occlusion.radius_mm = 0.0;
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap();
     let pose = Pose { translate_mm: Vec3::new(7.0, -9.0, 7.0), scale: Vec3::splat(10.0), ..Pose::default() };

@@ -3,10 +3,7 @@
 
 mod common;
 
-use cao::measure::stability::{
-    Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, radius, sheets, stereo,
-    views,
-};
+use cao_measure::stability::{Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, radius, sheets, stereo, views};
 use common::{close, open};
 
 /// Ours holds, the control fails, and what is drawn are numbers.

@@ -2,15 +2,17 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, Buffer, Format, Gpu, Image};
-use cao::measure::random::Random;
-use cao::method::volumes::volume_image;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::stage::field::Field;
-use cao::stage::near::{ANEW, CHANGED, Chosen, TODO};
-use cao::stage::sweep::{Bindings, Pass, Sweep, SweepPlan};
-use cao::stage::sweep_list::{self, SweepList, SweepLists};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, Buffer, Format, Gpu, Image};
+use cao_measure::random::Random;
+use cao::cast::volumes::volume_image;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::field::Field;
+use cao::sweep::near::{ANEW, CHANGED, Chosen, TODO};
+use cao::sweep::sweep::{Bindings, Pass, Sweep, SweepPlan};
+use cao::sweep::sweep_list;
+use cao::sweep::sweep_list::{SweepList, SweepLists};
 use common::*;
 
 /// Each ray's contribution is rounded to 1/65535 once: half a unit, times the rays, is the worst.
@@ -72,7 +74,7 @@ impl State {
         let held: Vec<u16> = opacity.iter().map(|a| (a * 65535.0).round() as u16).collect();
         let image = volume_image(gpu, "test opacity", field, Format::R16Unorm).unwrap();
         write_image(gpu, &image, bytemuck::cast_slice(&held));
-        let solid = buffer(gpu, "solid", bytemuck::cast_slice(&cpu::near::solid(grid, &held)));
+        let solid = buffer(gpu, "solid", bytemuck::cast_slice(&twin::sweep::near::solid(grid, &held)));
         Self { image, solid, held }
     }
 
@@ -118,7 +120,7 @@ fn every_window_equals_its_direct_evaluation() {
                 settings(rays, radius * smallest, offset.map(|o| o * smallest), step.map(|s| s * smallest));
             for largest in [0.3, 1.0] {
                 let state = State::new(&gpu, &field, grid, &opacities(&mut random, grid, largest));
-                let expected = cpu::sweep::sweep(grid, &state.opacity(), &occlusion, f64::from(REFERENCE_MM));
+                let expected = twin::sweep::sweep::sweep(grid, &state.opacity(), &occlusion, f64::from(REFERENCE_MM));
                 let plan = SweepPlan::new(field.dims, grid.spacing, &occlusion).unwrap();
                 let ambient = bench.full(&field, &plan, &state);
                 let tolerance = ROUNDING * 2.0 * plan.walks.len() as f64 + FUNCTIONS;
@@ -163,7 +165,7 @@ fn a_sparse_sweep_gives_the_bits_of_a_full_one_and_touches_nothing_else() {
             let ambient = filled(&gpu, &field, 12345);
             bench.run(&field, &plan, &[(Pass::Anew, &state)], &words, &ambient);
             for (i, found) in stored(&gpu, &ambient).into_iter().enumerate() {
-                let brick = cpu::bricks::bricks(&grid).index(grid.voxel(i).map(|c| c / 8));
+                let brick = twin::field::bricks::bricks(&grid).index(grid.voxel(i).map(|c| c / 8));
                 let expected = if words[brick] & ANEW != 0 { full[i] } else { 12345 };
                 assert_eq!(found, expected, "{:?}, {share} %, {rays:?}", grid.voxel(i));
             }
@@ -188,7 +190,7 @@ fn empty_bricks_are_passed_over_without_a_difference() {
         (RaySet::R6, 30.0, None),
     ] {
         let filled: Vec<bool> = (0..field.brick_count()).map(|_| random.below(100) < 8).collect();
-        let bricks = cpu::bricks::bricks(&grid);
+        let bricks = twin::field::bricks::bricks(&grid);
         let mut opacity = opacities(&mut random, &grid, 0.7);
         for (i, a) in opacity.iter_mut().enumerate() {
             if !filled[bricks.index(grid.voxel(i).map(|c| c / 8))] {
@@ -219,7 +221,7 @@ fn amending_gives_the_bits_of_a_full_sweep() {
         [Grid { dims: [44, 37, 50], spacing: [1.0; 3] }, Grid { dims: [21, 9, 70], spacing: [1.0, 0.8, 1.7] }]
     {
         let field = blank(&gpu, &grid);
-        let bricks = cpu::bricks::bricks(&grid);
+        let bricks = twin::field::bricks::bricks(&grid);
         for (rays, radius) in
             [(RaySet::W26, 6.0), (RaySet::W50, 14.0), (RaySet::W26, 40.0), (RaySet::R6, 1.0)]
         {
@@ -240,7 +242,7 @@ fn amending_gives_the_bits_of_a_full_sweep() {
                 }
                 let now = State::new(&gpu, &field, &grid, &opacity);
                 let full = stored(&gpu, &bench.full(&field, &plan, &now));
-                let octants = cpu::carve::changed(&grid, &before.held, &now.held);
+                let octants = twin::sweep::carve::changed(&grid, &before.held, &now.held);
                 // A few bricks have no value: they keep what they hold.
                 let words: Vec<u32> = octants
                     .iter()

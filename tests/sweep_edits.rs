@@ -3,18 +3,20 @@
 
 mod common;
 
-use cao::clip::Clip;
-use cao::gpu::Gpu;
-use cao::measure::random::Random;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::renderer::{COLOUR, Renderer, Setup};
-use cao::scene::Method;
-use cao::stage::classify::AntiAliasing;
-use cao::stage::clips::MapSettings;
-use cao::stage::lao::Scope;
-use cao::transfer::TransferFunction;
-use cao::volume::builtin::builtin_box;
-use cao::volume::{Values, Volume};
+use cao_model::clip::Clip;
+use cao_gpu::Gpu;
+use cao_measure::random::Random;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::renderer::{COLOUR, Renderer};
+use cao_model::settings::Setup;
+use cao_model::methods::Method;
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::MapSettings;
+use cao_model::settings::Scope;
+use cao_model::transfer::TransferFunction;
+use cao_model::builtin::builtin_box;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use common::*;
 
 const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, literal: false };

@@ -2,13 +2,14 @@
 
 mod common;
 
-use cao::cpu::{self, Grid};
-use cao::gpu::{Access, BufferUse, Gpu};
-use cao::measure::random::Random;
-use cao::occlusion::{Occlusion, Quadrature, RaySet};
-use cao::stage::near::{ANEW, CHANGED, Chosen, TODO};
-use cao::stage::sweep::{SweepPlan, Walk};
-use cao::stage::sweep_list::{Bindings, HEAD_BYTES, SweepList, SweepLists};
+use cao_twin as twin;
+use cao_twin::Grid;
+use cao_gpu::{Access, BufferUse, Gpu};
+use cao_measure::random::Random;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao::sweep::near::{ANEW, CHANGED, Chosen, TODO};
+use cao::sweep::sweep::{SweepPlan, Walk};
+use cao::sweep::sweep_list::{Bindings, HEAD_BYTES, SweepList, SweepLists};
 use common::*;
 use std::collections::BTreeSet;
 
@@ -69,7 +70,7 @@ fn runs(gpu: &Gpu, grid: &Grid, plan: &SweepPlan, amend: bool, todo: &[u32]) -> 
 /// Of the bricks to compute anew and of those that changed.
 fn bounds(grid: &Grid, todo: &[u32]) -> Chosen {
     let mut chosen = Chosen { bricks: 0, low: [u32::MAX; 6], high: [0; 6] };
-    let bricks = cpu::bricks::bricks(grid);
+    let bricks = twin::field::bricks::bricks(grid);
     for (i, word) in todo.iter().enumerate() {
         for (axis, place) in bricks.voxel(i).into_iter().enumerate() {
             let kinds = [(word & ANEW != 0, axis), (word / CHANGED != 0, 3 + axis)];
@@ -98,7 +99,7 @@ fn what_is_listed_suffices_and_is_not_much_more() {
                 step_mm: None,
             };
             let plan = SweepPlan::new(dims, grid.spacing, &occlusion).unwrap();
-            let bricks = cpu::bricks::bricks(grid);
+            let bricks = twin::field::bricks::bricks(grid);
             for (share, amend) in [0, 2, 20, 100].into_iter().flat_map(|s| [(s, false), (s, true)]) {
                 // Bricks of the other kind, beside them, are not listed.
                 let mut hit = |share: u64| random.below(100) < share;
@@ -138,7 +139,7 @@ fn what_is_listed_suffices_and_is_not_much_more() {
                             .flatten()
                             .any(|p| box_between(grid, voxel, p).into_iter().any(changed))
                     };
-                    let wanted = cpu::sweep_list::sweep_list(grid.dims, walk.ray.step, walk.axis, |voxel| {
+                    let wanted = twin::sweep::sweep_list::sweep_list(grid.dims, walk.ray.step, walk.axis, |voxel| {
                         if amend { meets(voxel) } else { word(voxel) & ANEW != 0 }
                     });
                     // The rays that begin or meet there, forwards and backwards, begin up to a window and a step before.

@@ -4,7 +4,7 @@
 mod simd;
 
 use cao::RaySet;
-use cao::measure::random::Random;
+use cao_measure::random::Random;
 use simd::{Line, Rule, Vectors, lines, sweep};
 
 /// Rounding of f32 through a window, with λ from logarithms and exponentials of a few units in the last place; the largest

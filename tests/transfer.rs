@@ -1,7 +1,7 @@
 //! Transfer functions: interpolation, the exact maximum, presets, the file format and its refusals.
 
 use cao::Error;
-use cao::transfer::{MAX_POINTS, PRESETS, TransferFunction};
+use cao_model::transfer::{MAX_POINTS, PRESETS, TransferFunction};
 use proptest::prelude::*;
 
 fn opacity(points: &[[f32; 2]]) -> TransferFunction {
@@ -9,7 +9,7 @@ fn opacity(points: &[[f32; 2]]) -> TransferFunction {
 }
 
 fn refusal(text: &str) -> String {
-    TransferFunction::from_toml(text).unwrap_err().to_string()
+    cao_formats::transfer::from_toml(text).unwrap_err().to_string()
 }
 
 #[test]
@@ -35,7 +35,7 @@ fn two_equal_values_make_a_step_that_belongs_to_the_second() {
 
 #[test]
 fn colours_are_srgb_in_the_file_and_linear_inside() {
-    let tf = TransferFunction::from_toml(
+    let tf = cao_formats::transfer::from_toml(
         "opacity = [[0, 0], [1, 1]]\ncolour = [[0, \"#000000\"], [10, \"#ffffff\"], [20, [0.5, 1, 0]]]",
     )
     .unwrap();
@@ -45,7 +45,7 @@ fn colours_are_srgb_in_the_file_and_linear_inside() {
     let [r, g, b] = tf.colour_at(30.0);
     assert!((r - 0.214_041).abs() < 1e-6 && g == 1.0 && b == 0.0);
     for single in ["\"#ff8000\"", "[1, 0.5019607843137255, 0]"] {
-        let tf = TransferFunction::from_toml(&format!("opacity = [[0, 1]]\ncolor = {single}")).unwrap();
+        let tf = cao_formats::transfer::from_toml(&format!("opacity = [[0, 1]]\ncolor = {single}")).unwrap();
         let [r, g, b] = tf.colour_at(123.0);
         assert!(r == 1.0 && (g - 0.215_860_5).abs() < 1e-6 && b == 0.0);
     }
@@ -54,14 +54,14 @@ fn colours_are_srgb_in_the_file_and_linear_inside() {
 #[test]
 fn reference_length_is_the_smallest_spacing_unless_given() {
     let with = "reference_mm = 2.5\nopacity = [[0, 1]]\ncolour = \"#ffffff\"";
-    assert_eq!(TransferFunction::from_toml(with).unwrap().reference_mm(0.7), 2.5);
+    assert_eq!(cao_formats::transfer::from_toml(with).unwrap().reference_mm(0.7), 2.5);
     assert_eq!(opacity(&[[0.0, 1.0]]).reference_mm(0.75), 0.75);
 }
 
 #[test]
 fn impossible_files_are_refused_by_key() {
     let good = "opacity = [[0, 0.5]]\ncolour = \"#ffffff\"\n";
-    assert!(TransferFunction::from_toml(good).is_ok());
+    assert!(cao_formats::transfer::from_toml(good).is_ok());
     let points: Vec<String> = (0..=MAX_POINTS).map(|i| format!("[{i}, 0.1]")).collect();
     let many = format!("opacity = [{}]\ncolour = \"#ffffff\"", points.join(","));
     for (text, expected) in [
@@ -160,16 +160,16 @@ fn load_takes_presets_and_files_and_names_what_is_wrong() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("mine.toml");
     let spec = path.to_str().unwrap();
-    assert!(TransferFunction::load("mr", (0.0, 1.0)).is_ok());
-    let found = TransferFunction::load("ct-bones", (0.0, 1.0)).unwrap_err().to_string();
+    assert!(cao_formats::transfer::load("mr", (0.0, 1.0)).is_ok());
+    let found = cao_formats::transfer::load("ct-bones", (0.0, 1.0)).unwrap_err().to_string();
     assert!(found.contains("\"ct-bones\"") && found.contains("auto, ct-bone, ct-soft, mr, paper"), "{found}");
     std::fs::write(&path, opacity(&[[0.0, 0.25]]).to_toml()).unwrap();
-    assert_eq!(TransferFunction::load(spec, (0.0, 1.0)).unwrap().opacity_at(0.0), 0.25);
+    assert_eq!(cao_formats::transfer::load(spec, (0.0, 1.0)).unwrap().opacity_at(0.0), 0.25);
     std::fs::write(&path, "opacity = [[0, 2]]\ncolour = \"#ffffff\"").unwrap();
-    let found = TransferFunction::load(spec, (0.0, 1.0)).unwrap_err();
+    let found = cao_formats::transfer::load(spec, (0.0, 1.0)).unwrap_err();
     assert!(matches!(&found, Error::File { field, .. } if field == "opacity[0]"), "{found}");
     assert!(found.to_string().contains("mine.toml"));
-    let found = TransferFunction::load(dir.path().to_str().unwrap(), (0.0, 1.0)).unwrap_err();
+    let found = cao_formats::transfer::load(dir.path().to_str().unwrap(), (0.0, 1.0)).unwrap_err();
     assert!(matches!(found, Error::Io { .. }), "a folder is not a file: {found}");
 }
 
@@ -195,7 +195,7 @@ fn any_transfer() -> impl Strategy<Value = TransferFunction> {
 proptest! {
     #[test]
     fn text_reads_back_bit_for_bit(tf in any_transfer()) {
-        prop_assert_eq!(TransferFunction::from_toml(&tf.to_toml()).unwrap(), tf);
+        prop_assert_eq!(cao_formats::transfer::from_toml(&cao_formats::transfer::to_toml(&tf)).unwrap(), tf);
     }
 
     /// Never below any value inside, and attained: at an end, at a point, or just below a step.

@@ -5,8 +5,9 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use cao::error::Error;
-use cao::volume::{self, Endian, Space, Values, Volume};
+use cao_formats::Error;
+use cao_model::values::{Endian, Values};
+use cao_model::volume::{Space, Volume};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -237,7 +238,7 @@ fn nrrd_returns_every_type_byte_order_and_encoding_attached_and_detached() {
                 folder.put("a file.raw", &data);
                 let detached = folder.put("a.nhdr", (header + "data file: a file.raw\n").as_bytes());
                 for path in [attached, detached] {
-                    let volume = volume::read(&path).unwrap();
+                    let volume = cao_formats::read(&path).unwrap();
                     assert_eq!(volume.values, values, "{} {endian_name} {encoding}", values.kind());
                     assert_eq!((volume.dims, volume.spacing), (DIMS, [0.5, 1.0, 2.0]));
                     assert_eq!((volume.slope, volume.intercept), (1.0, 0.0));
@@ -270,7 +271,7 @@ fn nrrd_knows_every_name_of_every_type() {
             let header =
                 nrrd_header(&[("type", Some(alias)), ("encoding", Some("txt")), ("sizes", Some("1 1 1"))]);
             let path = folder.put("a.nrrd", &joined(&(header + "\n"), b"7"));
-            let volume = volume::read(&path).unwrap();
+            let volume = cao_formats::read(&path).unwrap();
             assert_eq!((volume.values.kind(), volume.value(0)), (kind, 7.0), "{alias}");
         }
     }
@@ -284,7 +285,7 @@ fn nrrd_accepts_dos_line_ends_any_case_second_names_and_all_versions() {
             "{version}\r\nType: UCHAR\r\nDIMENSION: 3\r\nsizes: 2 1 1\r\nEncoding: RAW\r\ncenterings: cell cell cell\r\n\
              content:\r\nOldMin: 0\r\nlabels: \"x\" \"y\" \"the z\"\r\n\r\n"
         );
-        let volume = volume::read(&folder.put("a.nrrd", &joined(&header, &[8, 9]))).unwrap();
+        let volume = cao_formats::read(&folder.put("a.nrrd", &joined(&header, &[8, 9]))).unwrap();
         assert_eq!(volume.values, Values::U8(vec![8, 9]));
         assert_eq!(volume.spacing, [1.0; 3]);
     }
@@ -314,11 +315,11 @@ fn nrrd_joins_slices_from_lists_and_numbered_files() {
     ];
     for value in raw {
         let path = folder.put("a.nhdr", (nrrd_header(&[]) + "data file: " + value).as_bytes());
-        assert_eq!(volume::read(&path).unwrap().values, nrrd_values(), "{value}");
+        assert_eq!(cao_formats::read(&path).unwrap().values, nrrd_values(), "{value}");
     }
     let compressed = nrrd_header(&[("encoding", Some("gzip"))]);
     let list = compressed.clone() + "data file: LIST\ndown 1.raw.gz\ndown 0.raw.gz\n";
-    assert_eq!(volume::read(&folder.put("a.nhdr", list.as_bytes())).unwrap().values, nrrd_values());
+    assert_eq!(cao_formats::read(&folder.put("a.nhdr", list.as_bytes())).unwrap().values, nrrd_values());
 }
 
 #[test]
@@ -339,7 +340,7 @@ fn nrrd_skips_lines_and_bytes_before_the_data() {
         let detached = folder.put("a.nhdr", (nrrd_header(&changes) + "data file: a.raw\n").as_bytes());
         let attached = folder.put("a.nrrd", &joined(&(nrrd_header(&changes) + "\n"), &file));
         for path in [detached, attached] {
-            assert_eq!(volume::read(&path).unwrap().values, nrrd_values(), "{encoding} {lines} {bytes}");
+            assert_eq!(cao_formats::read(&path).unwrap().values, nrrd_values(), "{encoding} {lines} {bytes}");
         }
     }
 }
@@ -357,7 +358,7 @@ fn nrrd_turns_directions_and_units_into_millimetres_in_ras() {
             ("space origin", Some("(1000,2000,3000)")),
         ],
     );
-    let volume = volume::read(&path).unwrap();
+    let volume = cao_formats::read(&path).unwrap();
     assert_eq!(volume.space, Space::Ras);
     assert_close(volume.spacing, [0.05, 0.1, 0.2]);
     assert_close(volume.origin, [-1.0, -2.0, 3.0]);
@@ -366,15 +367,15 @@ fn nrrd_turns_directions_and_units_into_millimetres_in_ras() {
     assert_close(volume.directions[2], [0.0, 0.0, 1.0]);
 
     let path = nrrd(&folder, &[("space", Some("LAS")), ("space origin", Some("(1,2,3)"))]);
-    let volume = volume::read(&path).unwrap();
+    let volume = cao_formats::read(&path).unwrap();
     assert_close(volume.origin, [-1.0, 2.0, 3.0]);
     assert_close(volume.spacing, [0.5, 1.0, 2.0]);
 
     let scanner = [("space", Some("scanner-xyz")), ("space origin", Some("(1,2,3)"))];
-    let volume = volume::read(&nrrd(&folder, &scanner)).unwrap();
+    let volume = cao_formats::read(&nrrd(&folder, &scanner)).unwrap();
     assert_eq!((volume.space, volume.origin), (Space::Unknown, [1.0, 2.0, 3.0]));
 
-    let volume = volume::read(&nrrd(&folder, &[("units", Some("\"cm\" \"mm\" \"furlong\""))])).unwrap();
+    let volume = cao_formats::read(&nrrd(&folder, &[("units", Some("\"cm\" \"mm\" \"furlong\""))])).unwrap();
     assert_eq!(volume.spacing, [5.0, 1.0, 2.0]);
 
     let ends = [
@@ -383,7 +384,7 @@ fn nrrd_turns_directions_and_units_into_millimetres_in_ras() {
         ("axis maxs", Some("5 4 1")),
         ("centers", Some("cell node cell")),
     ];
-    assert_eq!(volume::read(&nrrd(&folder, &ends)).unwrap().spacing, [1.0, 2.0, 1.0]);
+    assert_eq!(cao_formats::read(&nrrd(&folder, &ends)).unwrap().spacing, [1.0, 2.0, 1.0]);
 }
 
 #[test]
@@ -403,7 +404,7 @@ fn nrrd_drops_a_fourth_axis_of_one_sample() {
         ("kinds", Some("domain domain domain list")),
     ];
     for changes in [&first[..], &last[..]] {
-        let volume = volume::read(&nrrd(&folder, changes)).unwrap();
+        let volume = cao_formats::read(&nrrd(&folder, changes)).unwrap();
         assert_eq!((volume.dims, volume.spacing), (DIMS, [1.0, 2.0, 3.0]));
         assert_eq!(volume.values, nrrd_values());
     }
@@ -471,16 +472,16 @@ fn nrrd_says_which_field_of_the_header_is_wrong() {
             changes.extend([("spacings", Some("1 1 1 1")), ("kinds", Some("vector domain domain domain"))]);
         }
         let path = nrrd(&folder, &changes);
-        assert_refused(volume::read(&path), &path, field, says);
+        assert_refused(cao_formats::read(&path), &path, field, says);
     }
     let path = folder.put("a.nrrd", b"NRRD0009\n\n");
-    assert_refused(volume::read(&path), &path, "magic", &["NRRD0009", "NRRD0005"]);
+    assert_refused(cao_formats::read(&path), &path, "magic", &["NRRD0009", "NRRD0005"]);
     let path = folder.put("a.nrrd", b"");
-    assert_refused(volume::read(&path), &path, "magic", &["expected NRRD0001"]);
+    assert_refused(cao_formats::read(&path), &path, "magic", &["expected NRRD0001"]);
     let path = folder.put("a.nrrd", b"NRRD0004\ntype uint8\n\n");
-    assert_refused(volume::read(&path), &path, "header", &["type uint8", "field: value"]);
+    assert_refused(cao_formats::read(&path), &path, "header", &["type uint8", "field: value"]);
     let path = folder.put("a.nrrd", (nrrd_header(&[]) + "type: float\n\n").as_bytes());
-    assert_refused(volume::read(&path), &path, "type", &["given twice"]);
+    assert_refused(cao_formats::read(&path), &path, "type", &["given twice"]);
 }
 
 #[test]
@@ -519,11 +520,11 @@ fn nrrd_says_what_is_wrong_with_the_data() {
     for (encoding, data, says) in cases {
         let header = nrrd_header(&[("encoding", Some(encoding))]);
         let attached = folder.put("a.nrrd", &joined(&(header.clone() + "\n"), &data));
-        assert_refused(volume::read(&attached), &attached, "data", says);
+        assert_refused(cao_formats::read(&attached), &attached, "data", says);
         // Detached data: the data file is the one at fault.
         let detached = folder.put("a.nhdr", (header + "data file: a.raw\n").as_bytes());
         let file = folder.put("a.raw", &data);
-        assert_refused(volume::read(&detached), &file, "data", says);
+        assert_refused(cao_formats::read(&detached), &file, "data", says);
     }
 }
 
@@ -548,7 +549,7 @@ fn nrrd_says_which_data_file_is_missing_or_does_not_fit() {
     ];
     for (value, says) in cases {
         let path = folder.put("a.nhdr", (nrrd_header(&[]) + "data file: " + value + "\n").as_bytes());
-        assert_refused(volume::read(&path), &path, "data file", says);
+        assert_refused(cao_formats::read(&path), &path, "data file", says);
     }
 }
 
@@ -558,16 +559,16 @@ fn absurd_promises_cost_nothing_and_bombs_are_cut_off() {
     // 10¹⁵ bytes from a short file: refused before memory is asked for, whatever the encoding.
     for encoding in ["raw", "gzip", "ascii"] {
         let path = nrrd(&folder, &[("encoding", Some(encoding)), ("sizes", Some("100000 100000 50000"))]);
-        assert_refused(volume::read(&path), &path, "data", &["60 bytes"]);
+        assert_refused(cao_formats::read(&path), &path, "data", &["60 bytes"]);
     }
     // 64 MiB of zeros where 60 bytes are expected.
     let header = nrrd_header(&[("encoding", Some("gzip"))]) + "\n";
     let path = folder.put("bomb.nrrd", &joined(&header, &gzip(&vec![0; 64 << 20])));
-    assert_refused(volume::read(&path), &path, "data", &["more than 60 bytes after decompression"]);
+    assert_refused(cao_formats::read(&path), &path, "data", &["more than 60 bytes after decompression"]);
     // The same for a data file beside the header.
     let header = nrrd_header(&[("sizes", Some("5 3 20000000000"))]);
     let path = folder.put("a.nhdr", (header + "data file: bomb.nrrd\n").as_bytes());
-    assert_refused(volume::read(&path), &folder.0.path().join("bomb.nrrd"), "data", &["600000000000 bytes"]);
+    assert_refused(cao_formats::read(&path), &folder.0.path().join("bomb.nrrd"), "data", &["600000000000 bytes"]);
 }
 
 #[test]
@@ -581,17 +582,17 @@ fn values_that_are_no_numbers_are_refused_with_their_place_and_count() {
         let data = if encoding == "raw" { bytes_of(&values, Endian::Big) } else { text_of(&values) };
         let changes = [("type", Some("float")), ("endian", Some("big")), ("encoding", Some(encoding))];
         let path = folder.put("a.nrrd", &joined(&(nrrd_header(&changes) + "\n"), &data));
-        assert_refused(volume::read(&path), &path, "data", &says);
+        assert_refused(cao_formats::read(&path), &path, "data", &says);
     }
     let path = folder.put("a.raw", &bytes_of(&values, Endian::Little));
-    assert_refused(volume::read_raw(&path, DIMS, "float", Endian::Little, [1.0; 3]), &path, "data", &says);
+    assert_refused(cao_formats::read_raw(&path, DIMS, "float", Endian::Little, [1.0; 3]), &path, "data", &says);
     let path = folder.put(
         "a.mha",
         &joined(&meta_header(&[("ElementType", "MET_FLOAT")]), &bytes_of(&values, Endian::Little)),
     );
-    assert_refused(volume::read(&path), &path, "data", &says);
+    assert_refused(cao_formats::read(&path), &path, "data", &says);
     let path = folder.put("a.nii", &Nifti::new(1, &values, Endian::Big).file());
-    assert_refused(volume::read(&path), &path, "data", &says);
+    assert_refused(cao_formats::read(&path), &path, "data", &says);
 }
 
 // ----------------------------------------------------------------------------------------------------------- NIfTI
@@ -723,7 +724,7 @@ fn nifti_returns_every_type_and_byte_order_of_both_versions_compressed_and_in_pa
                 paths.push(folder.put("zipped.hdr.gz", &gzip(&nifti.header)));
                 paths.push(folder.put("zipped.img.gz", &gzip(&nifti.data)));
                 for path in paths {
-                    let volume = volume::read(&path).unwrap();
+                    let volume = cao_formats::read(&path).unwrap();
                     assert_eq!(
                         volume.values,
                         values,
@@ -748,7 +749,7 @@ fn nifti_keeps_stored_values_and_scales_on_access() {
         {
             let mut nifti = Nifti::new(version, &nrrd_values(), Endian::Big);
             nifti.reals(SLOPE, &[slope, intercept]);
-            let volume = volume::read(&folder.put("a.nii", &nifti.file())).unwrap();
+            let volume = cao_formats::read(&folder.put("a.nii", &nifti.file())).unwrap();
             assert_eq!((volume.slope, volume.intercept), expected);
             assert_eq!(volume.values, nrrd_values());
             assert_eq!(volume.value(3), expected.0 * -700.0 + expected.1);
@@ -762,7 +763,7 @@ fn a_slope_that_leads_beyond_all_numbers_is_refused() {
     let mut nifti = Nifti::new(2, &nrrd_values(), Endian::Little);
     nifti.reals(SLOPE, &[1e308, 0.0]);
     let path = folder.put("a.nii", &nifti.file());
-    assert_refused(volume::read(&path), &path, "data", &["slope", "finite"]);
+    assert_refused(cao_formats::read(&path), &path, "data", &["slope", "finite"]);
 }
 
 #[test]
@@ -775,7 +776,7 @@ fn nifti_places_the_grid_by_sform_qform_and_units() {
         nifti.reals(QUATERN, &[0.0, 0.0, 0.5f64.sqrt()]);
         nifti.reals(QOFFSET, &[1.0, 2.0, 3.0]);
         nifti.codes(1, 0);
-        let volume = volume::read(&folder.put("a.nii", &nifti.file())).unwrap();
+        let volume = cao_formats::read(&folder.put("a.nii", &nifti.file())).unwrap();
         assert_eq!(volume.space, Space::Ras);
         assert_close(volume.spacing, [0.5, 1.0, 2.0]);
         assert_close(volume.origin, [1.0, 2.0, 3.0]);
@@ -787,7 +788,7 @@ fn nifti_places_the_grid_by_sform_qform_and_units() {
         nifti.codes(1, 2);
         for (unit, factor) in [(0, 1.0), (1, 1000.0), (2, 1.0), (3, 1e-3), (2 + 8, 1.0)] {
             nifti.units(unit);
-            let volume = volume::read(&folder.put("a.nii", &nifti.file())).unwrap();
+            let volume = cao_formats::read(&folder.put("a.nii", &nifti.file())).unwrap();
             assert_close(volume.spacing.map(|s| s / factor), [0.5, 1.0, 2.0]);
             assert_close(volume.origin.map(|o| o / factor), [7.0, 8.0, 9.0]);
             assert_close(volume.directions[0], [0.0, 0.0, 1.0]);
@@ -797,7 +798,7 @@ fn nifti_places_the_grid_by_sform_qform_and_units() {
         // A sheared sform gives way to the scanner's grid.
         nifti.units(2);
         nifti.sform([[0.5, 0.5, 0.0, 7.0], [0.0, 1.0, 0.0, 8.0], [0.0, 0.0, 2.0, 9.0]]);
-        let volume = volume::read(&folder.put("a.nii", &nifti.file())).unwrap();
+        let volume = cao_formats::read(&folder.put("a.nii", &nifti.file())).unwrap();
         assert_close(volume.directions[0], [0.0, 1.0, 0.0]);
         assert_close(volume.origin, [1.0, 2.0, 3.0]);
     }
@@ -812,7 +813,7 @@ fn nifti_accepts_a_fourth_dimension_of_one_and_extensions_before_the_data() {
         nifti.offset(nifti.header.len() as f64 + 4.0 + 16.0);
         nifti.data.splice(0..0, [9; 16]);
         for (name, file) in [("a.nii", nifti.file()), ("a.nii.gz", gzip(&nifti.file()))] {
-            assert_eq!(volume::read(&folder.put(name, &file)).unwrap().values, nrrd_values());
+            assert_eq!(cao_formats::read(&folder.put(name, &file)).unwrap().values, nrrd_values());
         }
     }
 }
@@ -857,18 +858,18 @@ fn nifti_says_which_field_is_wrong() {
                 let mut nifti = Nifti::new(version, &nrrd_values(), endian);
                 change(&mut nifti);
                 let path = folder.put("a.nii", &nifti.file());
-                assert_refused(volume::read(&path), &path, field, says);
+                assert_refused(cao_formats::read(&path), &path, field, says);
             }
         }
         let mut pair = Nifti::new(version, &nrrd_values(), Endian::Little);
         pair.header[if version == 1 { 345 } else { 5 }] = b'i';
         let path = folder.put("lonely.hdr", &pair.header);
-        assert_refused(volume::read(&path), &path, "data", &["lonely.img", "No such file"]);
+        assert_refused(cao_formats::read(&path), &path, "data", &["lonely.img", "No such file"]);
         let packed = gzip(&Nifti::new(version, &nrrd_values(), Endian::Little).file());
         let path = folder.put("a.nii.gz", &packed[..packed.len() - 9]);
-        assert_refused(volume::read(&path), &path, "data", &["truncated or damaged"]);
+        assert_refused(cao_formats::read(&path), &path, "data", &["truncated or damaged"]);
         let path = folder.put("a.nii.gz", &packed[..15]);
-        assert_refused(volume::read(&path), &path, "header", &[]);
+        assert_refused(cao_formats::read(&path), &path, "header", &[]);
     }
 }
 
@@ -936,7 +937,7 @@ fn metaimage_returns_every_type_byte_order_and_encoding_attached_and_detached() 
                     changes.push(("ElementDataFile", "a.data"));
                     let detached = folder.put("a.mhd", meta_header(&changes).as_bytes());
                     for path in [local, detached] {
-                        let volume = volume::read(&path).unwrap();
+                        let volume = cao_formats::read(&path).unwrap();
                         assert_eq!(volume.values, values, "{name} {big} {encoding}");
                         assert_eq!((volume.dims, volume.spacing), (DIMS, [0.5, 1.0, 2.0]));
                         assert_eq!(volume.space, Space::Unknown);
@@ -964,7 +965,7 @@ fn metaimage_joins_slices_and_skips_foreign_headers() {
     ] {
         let header = meta_header(&[("ElementDataFile", file), ("HeaderSize", size)]);
         let path = folder.put("a.mhd", header.as_bytes());
-        assert_eq!(volume::read(&path).unwrap().values, nrrd_values(), "{file}");
+        assert_eq!(cao_formats::read(&path).unwrap().values, nrrd_values(), "{file}");
     }
 }
 
@@ -988,7 +989,7 @@ fn metaimage_turns_lps_into_ras_and_units_into_millimetres() {
                 ("SomebodysKey", "any = thing"),
             ],
         );
-        let volume = volume::read(&path).unwrap();
+        let volume = cao_formats::read(&path).unwrap();
         assert_eq!(volume.space, Space::Ras);
         assert_close(volume.spacing, [0.5, 1.0, 2.0]);
         assert_close(volume.origin, [-10.0, -20.0, 30.0]);
@@ -1038,23 +1039,23 @@ fn metaimage_says_which_field_is_wrong() {
     let folder = Folder::new();
     for (changes, field, says) in cases {
         let path = meta(&folder, changes);
-        assert_refused(volume::read(&path), &path, field, says);
+        assert_refused(cao_formats::read(&path), &path, field, says);
     }
     let path = folder.put("a.mha", b"NDims = 3\n");
-    assert_refused(volume::read(&path), &path, "ElementDataFile", &["missing", "last line"]);
+    assert_refused(cao_formats::read(&path), &path, "ElementDataFile", &["missing", "last line"]);
     let path = folder.put("a.mha", b"NDims = 3\nNDims = 3\n");
-    assert_refused(volume::read(&path), &path, "NDims", &["given twice"]);
+    assert_refused(cao_formats::read(&path), &path, "NDims", &["given twice"]);
     let path = folder.put("a.mha", b"\x00\x01\x02");
-    assert_refused(volume::read(&path), &path, "header", &["expected `Key = value`"]);
+    assert_refused(cao_formats::read(&path), &path, "header", &["expected `Key = value`"]);
     let data = bytes_of(&nrrd_values(), Endian::Little);
     for (bytes, found) in [(&data[..58], "58 bytes"), (&[data.clone(), data.clone()].concat(), "120 bytes")] {
         let path = folder.put("a.mha", &joined(&meta_header(&[]), bytes));
-        assert_refused(volume::read(&path), &path, "data", &[found, "exactly 60 bytes"]);
+        assert_refused(cao_formats::read(&path), &path, "data", &[found, "exactly 60 bytes"]);
     }
     let packed = zlib(&data);
     let path = folder
         .put("a.mha", &joined(&meta_header(&[("CompressedData", "True")]), &packed[..packed.len() - 3]));
-    assert_refused(volume::read(&path), &path, "data", &["truncated or damaged"]);
+    assert_refused(cao_formats::read(&path), &path, "data", &["truncated or damaged"]);
 }
 
 // ------------------------------------------------------------------------------------------- raw, unknown, open, write
@@ -1065,7 +1066,7 @@ fn raw_returns_every_type_and_byte_order() {
     for values in all_types() {
         for (endian, name) in ENDIANS {
             let path = folder.put("a.raw", &bytes_of(&values, endian));
-            let volume = volume::read_raw(&path, DIMS, values.kind(), endian, [1.0, 2.0, 3.0]).unwrap();
+            let volume = cao_formats::read_raw(&path, DIMS, values.kind(), endian, [1.0, 2.0, 3.0]).unwrap();
             assert_eq!(volume.values, values, "{name}");
             assert_eq!((volume.dims, volume.spacing), (DIMS, [1.0, 2.0, 3.0]));
         }
@@ -1077,7 +1078,7 @@ fn raw_names_what_does_not_fit() {
     let folder = Folder::new();
     for (length, found) in [(59, "59 bytes"), (61, "61 bytes")] {
         let path = folder.put("a.raw", &vec![0; length]);
-        let result = volume::read_raw(&path, DIMS, "i16", Endian::Little, [1.0; 3]);
+        let result = cao_formats::read_raw(&path, DIMS, "i16", Endian::Little, [1.0; 3]);
         assert_refused(result, &path, "data", &[found, "exactly 60 bytes"]);
     }
     let path = folder.put("a.raw", &[0; 60]);
@@ -1088,12 +1089,12 @@ fn raw_names_what_does_not_fit() {
         (DIMS, "i16", -1.0, "spacing: -1 mm"),
     ];
     for (dims, kind, spacing, says) in cases {
-        let error = volume::read_raw(&path, dims, kind, Endian::Little, [spacing; 3]).unwrap_err();
+        let error = cao_formats::read_raw(&path, dims, kind, Endian::Little, [spacing; 3]).unwrap_err();
         assert!(matches!(error, Error::Config { .. }), "{error:?}");
         assert!(error.to_string().starts_with(says), "{error}");
     }
     let gone = folder.0.path().join("gone.raw");
-    let result = volume::read_raw(&gone, DIMS, "u8", Endian::Little, [1.0; 3]);
+    let result = cao_formats::read_raw(&gone, DIMS, "u8", Endian::Little, [1.0; 3]);
     assert_refused(result, &gone, "data", &["No such file"]);
 }
 
@@ -1101,18 +1102,18 @@ fn raw_names_what_does_not_fit() {
 fn unknown_content_is_refused_with_the_formats_that_are_known() {
     let folder = Folder::new();
     let path = folder.put("a.png", b"\x89PNG\r\n\x1a\n");
-    assert_refused(volume::read(&path), &path, "format", &["NRRD", "NIfTI", "MetaImage", "raw"]);
+    assert_refused(cao_formats::read(&path), &path, "format", &["NRRD", "NIfTI", "MetaImage", "raw"]);
     let path = folder.put("empty", b"");
-    assert_refused(volume::read(&path), &path, "format", &["NRRD"]);
+    assert_refused(cao_formats::read(&path), &path, "format", &["NRRD"]);
     let path = folder.put("a.gz", &gzip(b"something else"));
-    assert_refused(volume::read(&path), &path, "format", &["NRRD"]);
+    assert_refused(cao_formats::read(&path), &path, "format", &["NRRD"]);
 }
 
 #[test]
 fn a_file_that_cannot_be_opened_is_named() {
     let folder = Folder::new();
     for path in [folder.0.path().join("gone.nrrd"), folder.0.path().to_path_buf()] {
-        let error = volume::open(path.to_str().unwrap()).unwrap_err();
+        let error = cao_formats::open(path.to_str().unwrap()).unwrap_err();
         assert!(matches!(&error, Error::Io { path: found, .. } if *found == path), "{error:?}");
     }
 }
@@ -1121,7 +1122,7 @@ fn a_file_that_cannot_be_opened_is_named() {
 fn open_takes_a_file_and_refuses_a_malformed_built_in() {
     let folder = Folder::new();
     let path = nrrd(&folder, &[]);
-    assert_eq!(volume::open(path.to_str().unwrap()).unwrap().values, nrrd_values());
+    assert_eq!(cao_formats::open(path.to_str().unwrap()).unwrap().values, nrrd_values());
     for spec in [
         "builtin:",
         "builtin:engine",
@@ -1130,7 +1131,7 @@ fn open_takes_a_file_and_refuses_a_malformed_built_in() {
         "builtin:engine:-3",
         "builtin:engine:x",
     ] {
-        let error = volume::open(spec).unwrap_err();
+        let error = cao_formats::open(spec).unwrap_err();
         assert!(matches!(&error, Error::Config { what, .. } if what == spec), "{error:?}");
         assert!(error.to_string().contains("builtin:NAME:SIZE"), "{error}");
     }
@@ -1143,8 +1144,8 @@ fn a_written_volume_reads_back_with_its_grid() {
     let mut like = Volume::new(DIMS, [0.957031, 0.1, 3.0], nrrd_values()).unwrap();
     let path = folder.0.path().join("out.nrrd");
     let check = |like: &Volume| {
-        volume::write_nrrd(&path, like, &data, "ambient\noccupancy: x").unwrap();
-        let back = volume::read(&path).unwrap();
+        cao_formats::write_nrrd(&path, like, &data, "ambient\noccupancy: x").unwrap();
+        let back = cao_formats::read(&path).unwrap();
         assert_eq!(back.values, Values::F32(data.clone()));
         assert_eq!((back.dims, back.space), (like.dims, like.space));
         assert_close(back.spacing, like.spacing);
@@ -1171,24 +1172,24 @@ fn a_failed_write_leaves_the_old_file_and_nothing_else() {
     let folder = Folder::new();
     let like = Volume::new(DIMS, [1.0; 3], nrrd_values()).unwrap();
     let path = folder.put("out.nrrd", b"old");
-    let error = volume::write_nrrd(&path, &like, &[0.0; 29], "").unwrap_err();
+    let error = cao_formats::write_nrrd(&path, &like, &[0.0; 29], "").unwrap_err();
     assert!(error.to_string().contains("29 values, expected 30"), "{error}");
-    let error = volume::write_atomic(&path, |out| {
+    let error = cao_formats::write_atomic(&path, |out| {
         out.write_all(&[0; 100_000])?;
         Err(std::io::Error::other("disk full"))
     });
     let error = error.unwrap_err();
     assert!(matches!(&error, Error::Io { path: found, .. } if *found == path), "{error:?}");
-    let panicked = std::panic::catch_unwind(|| volume::write_atomic(&path, |_| panic!("in the middle")));
+    let panicked = std::panic::catch_unwind(|| cao_formats::write_atomic(&path, |_| panic!("in the middle")));
     assert!(panicked.is_err());
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(folder.names(), ["out.nrrd"]);
 
     let nowhere = folder.0.path().join("nowhere").join("out.nrrd");
     assert!(
-        matches!(volume::write_nrrd(&nowhere, &like, &[0.0; 30], ""), Err(Error::Io { path, .. }) if path == nowhere)
+        matches!(cao_formats::write_nrrd(&nowhere, &like, &[0.0; 30], ""), Err(Error::Io { path, .. }) if path == nowhere)
     );
-    let error = volume::write_nrrd(folder.0.path(), &like, &[0.0; 30], "").unwrap_err();
+    let error = cao_formats::write_nrrd(folder.0.path(), &like, &[0.0; 30], "").unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(cause.contains("not a regular file"), "{error}: {cause}");
     assert_eq!(folder.names(), ["out.nrrd"]);
@@ -1230,7 +1231,7 @@ fn read_damaged(name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = Folder::new();
     folder.put("x001.raw", &[1; 30]);
     folder.put("x002.raw", &[2; 30]);
-    match volume::read(&folder.put(name, bytes)) {
+    match cao_formats::read(&folder.put(name, bytes)) {
         Ok(volume) => {
             prop_assert_eq!(volume.len(), volume.dims.iter().product::<usize>());
             prop_assert!(volume.spacing.iter().all(|s| *s > 0.0 && s.is_finite()));
@@ -1247,7 +1248,7 @@ fn specimens_are_sound_before_they_are_damaged() {
         let folder = Folder::new();
         folder.put("x001.raw", &[1; 30]);
         folder.put("x002.raw", &[2; 30]);
-        assert_eq!(volume::read(&folder.put(name, &bytes)).unwrap().len(), COUNT, "{name}");
+        assert_eq!(cao_formats::read(&folder.put(name, &bytes)).unwrap().len(), COUNT, "{name}");
     }
 }
 
@@ -1330,7 +1331,7 @@ fn real_files_have_the_size_and_type_in_their_names() {
         let kind = parts.next().unwrap();
         let dims: Vec<usize> = parts.next().unwrap().split('x').map(|d| d.parse().unwrap()).collect();
         let start = std::time::Instant::now();
-        let volume = volume::read(&path).unwrap();
+        let volume = cao_formats::read(&path).unwrap();
         let seconds = start.elapsed().as_secs_f64();
         assert_eq!(volume.dims.as_slice(), dims, "{}", path.display());
         assert_eq!(volume.values.kind(), kind, "{}", path.display());

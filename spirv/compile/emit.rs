@@ -16,7 +16,7 @@ pub fn rust(shaders: &[Shader]) -> String {
 fn module(out: &mut String, shader: &Shader) -> std::fmt::Result {
     writeln!(out, "/// Compiled from `spirv/{}.wgsl`.", shader.name)?;
     writeln!(out, "pub mod {} {{", shader.name)?;
-    writeln!(out, "    use crate::gpu::{{format::Format, shader::*}};")?;
+    writeln!(out, "    use cao_gpu::{{Format, shader::*}};")?;
     writeln!(out, "    /// Code, entry points and bindings.")?;
     writeln!(out, "    pub static SHADER: Shader = Shader {{")?;
     writeln!(out, "        name: {:?},", shader.name)?;

@@ -17,7 +17,7 @@ impl Source {
     /// is first asked for.
     pub fn read(path: &Path) -> Result<Self, String> {
         let mut source = Self { text: String::new(), lines: Vec::new(), files: Vec::new() };
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let folder = path.parent().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
         source.append(&folder, path, &mut Vec::new()).map_err(|e| format!("error: {e}"))?;
         Ok(source)
     }

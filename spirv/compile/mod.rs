@@ -49,8 +49,13 @@ pub fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     if folder.is_dir() {
         for entry in std::fs::read_dir(folder)? {
             let path = entry?.path();
-            if path.extension().is_some_and(|e| e == "wgsl") {
-                list.push(path);
+            if path.is_dir() && !path.ends_with("shared") {
+                for inner in std::fs::read_dir(path)? {
+                    let path = inner?.path();
+                    if path.extension().is_some_and(|e| e == "wgsl") {
+                        list.push(path);
+                    }
+                }
             }
         }
     }

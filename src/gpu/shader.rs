@@ -183,7 +183,7 @@ pub const fn member_size<S, F>(_: fn(&S) -> &F) -> usize {
 /// offset and size.
 ///
 /// ```ignore
-/// cao::layout_check!(LaoParams => cao::gpu::shaders::lao::LAO_PARAMS { dims, rays, step });
+/// cao_gpu::layout_check!(LaoParams => cao_kernels::lao::LAO_PARAMS { dims, rays, step });
 /// ```
 #[macro_export]
 macro_rules! layout_check {
@@ -200,7 +200,7 @@ macro_rules! layout_check {
                     concat!("offset of member `", stringify!($field), "` differs from the WGSL struct")
                 );
                 assert!(
-                    $crate::gpu::shader::member_size(|s: &$host| &s.$field) == $layout.field(stringify!($field)).1,
+                    $crate::shader::member_size(|s: &$host| &s.$field) == $layout.field(stringify!($field)).1,
                     concat!("size of member `", stringify!($field), "` differs from the WGSL struct")
                 );
             )+

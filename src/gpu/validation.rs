@@ -118,7 +118,7 @@ mod tests {
     /// Two submits without a barrier between them, which `Recorder` cannot express.
     #[test]
     fn a_missing_barrier_between_two_submits_is_seen() {
-        use crate::gpu::{BufferUse, Gpu, OpenOptions};
+        use crate::{BufferUse, Gpu, OpenOptions};
         let gpu = Gpu::open(&OpenOptions { validation: true, ..Default::default() }).unwrap();
         let x = gpu.buffer("x", 64, BufferUse::Device).unwrap();
         let device = &gpu.0.device;

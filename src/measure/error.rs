@@ -3,7 +3,7 @@
 //! Only voxels that a renderer can sample count: see [`counting`]. Structural similarity is in [`super::ssim`], FLIP in
 //! [`super::flip`].
 
-use crate::cpu::Grid;
+use cao_twin::Grid;
 
 /// How far values are from their reference.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,12 +3,12 @@
 
 use super::random::Random;
 use crate::Result;
-use crate::clip::{Clip, Mode, Pose, Shape};
-use crate::gpu::Timings;
-use crate::renderer::{Categories, Renderer};
-use crate::stage::compare::Difference;
-use crate::stage::eyes::Look;
-use crate::view::{StereoRig, View};
+use cao::renderer::{Categories, Renderer};
+use cao::verify::compare::Difference;
+use cao_gpu::Timings;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::look::Look;
+use cao_model::view::{StereoRig, View};
 use glam::Vec3;
 
 /// What is tried.

@@ -4,7 +4,7 @@
 //! Per pixel, ΔE = ΔE_c^(1 − ΔE_f) in 0 … 1. ΔE_c compares colours after a filter for what the eye resolves, in L*a*b* with
 //! Hunt's adjustment and the HyAB distance (§4.1); ΔE_f compares how strong edges and points are in the luminance (§4.2).
 
-use crate::picture::Picture;
+use cao_formats::Picture;
 use glam::{DMat3, DVec3};
 
 /// Pixels per degree of sight of the paper's default: a screen of 0.7 m and 3840 pixels, seen from 0.7 m.

@@ -15,15 +15,16 @@
 use super::error::errors;
 use super::random::Random;
 use super::reference::{Plan, ambient_in};
-use crate::cpu::Grid;
-use crate::gpu::Gpu;
-use crate::method::trial::Trial;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::{Renderer, Setup};
-use crate::scene::Method;
-use crate::stage::field::BRICK;
-use crate::stage::lao::Scope;
 use crate::{Error, Result};
+use cao::field::BRICK;
+use cao::renderer::Renderer;
+use cao::verify::probe::Probe;
+use cao_gpu::Gpu;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
+use cao_twin::Grid;
 
 /// Bricks that errors and times are measured on.
 pub const SAMPLES: usize = 24;
@@ -216,8 +217,9 @@ fn try_all(
                     let (rmse, bound) = judge(samples, |_, voxel| values[voxel]);
                     tried.add(Measured { candidate, rmse, bound, ms });
                 }
-                Err(Error::Config { .. } | Error::Limit { .. }) => {}
-                Err(error) => return Err(error),
+                // A setting that this method does not have.
+                Err(cao::Error::Model(_)) => {}
+                Err(error) => return Err(error.into()),
             }
         }
         progress(part(i + 1));
@@ -272,7 +274,7 @@ impl Calibration {
         if let Some(chosen) = chosen {
             return Ok(*chosen);
         }
-        let refuse = |what: &str, problem: String| Error::Config { what: what.into(), problem };
+        let refuse = |what: &str, problem: String| Error::refused(what, problem);
         let Some(best) = best else {
             return Err(refuse("budget", "no settings to choose from".into()));
         };
@@ -335,7 +337,7 @@ struct Scene<'a> {
     gpu: Gpu,
     grid: Grid,
     opacity: Vec<f32>,
-    trial: Trial<'a>,
+    trial: Probe<'a>,
 }
 
 impl<'a> Scene<'a> {
@@ -343,7 +345,7 @@ impl<'a> Scene<'a> {
         let gpu = renderer.gpu().clone();
         let field = renderer.field();
         let grid = Grid { dims: field.dims.map(|d| d as usize), spacing: field.spacing.map(f64::from) };
-        let (trial, opacity) = renderer.trial()?;
+        let (trial, opacity) = renderer.probe()?;
         Ok(Self { gpu, grid, opacity, trial })
     }
 
@@ -571,7 +573,7 @@ mod tests {
 
     #[test]
     fn flags_limit_the_candidates() {
-        let mut setup = Setup::paper(1.0);
+        let mut setup = Setup::of(cao_model::methods::Method::Cao, 1.0);
         setup.occlusion.radius_mm = 7.0;
         let count = |list: &[Candidate], method| list.iter().filter(|c| c.method == method).count();
         let all = candidates(&setup, None, None, None);

@@ -175,7 +175,7 @@ impl Drawing {
 
     /// The drawing as a PNG file, two pixels for one.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let refused = |problem| Error::Config { what: "chart".into(), problem };
+        let refused = |problem| Error::refused("chart", problem);
         PngBackend::new().with_scale(PNG_SCALE).render_scene(&self.scene).map_err(refused)
     }
 }

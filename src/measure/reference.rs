@@ -7,16 +7,18 @@
 
 use super::error::{Errors, counting, errors};
 use super::random::Random;
-use crate::cpu::Grid;
-use crate::cpu::raycast::{Frame, Image, ambient_positions, raycast_lit};
-use crate::gpu::{self, Gpu};
-use crate::method::parts::in_parts;
-use crate::occlusion::Integral;
-use crate::stage::field::Field;
-use crate::stage::reference::{Points, Reference as Kernel, upload_clearance};
-use crate::view::View;
-use crate::volume::{Values, Volume};
+use crate::kernels::reference::{Points, Reference as Kernel, upload_clearance};
 use crate::{Error, Result};
+use cao::cast::parts::in_parts;
+use cao::field::Field;
+use cao::gpu;
+use cao_gpu::Gpu;
+use cao_model::occlusion::Integral;
+use cao_model::values::Values;
+use cao_model::view::View;
+use cao_model::volume::Volume;
+use cao_twin::Grid;
+use cao_twin::draw::raycast::{Frame, Image, ambient_positions, raycast_lit};
 
 /// How well a reference is to converge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,10 +166,7 @@ fn check(what: &str, value: f64, least: f64) -> Result<()> {
     if value.is_finite() && value >= least {
         return Ok(());
     }
-    Err(Error::Config {
-        what: what.into(),
-        problem: format!("{value}; expected a finite number of at least {least}"),
-    })
+    Err(Error::refused(what, format!("{value}; expected a finite number of at least {least}")))
 }
 
 fn volume(
@@ -310,14 +309,14 @@ struct Scene<'a> {
 impl<'a> Scene<'a> {
     fn new(gpu: &'a Gpu, kernel: &'a Kernel, grid: &Grid, opacity: &[f32]) -> Result<Self> {
         if opacity.len() != grid.len() || !opacity.iter().all(|a| (0.0..=1.0).contains(a)) {
-            return Err(Error::Config {
-                what: "opacity of a reference".into(),
-                problem: format!(
+            return Err(Error::refused(
+                "opacity of a reference",
+                format!(
                     "{} values; expected one from 0 to 1 for each of {} voxels",
                     opacity.len(),
                     grid.len()
                 ),
-            });
+            ));
         }
         let rimmed = Grid { dims: grid.dims.map(|d| d + 2), ..*grid };
         let mut values = vec![0.0; rimmed.len()];
@@ -343,12 +342,13 @@ impl<'a> Scene<'a> {
     ) -> Result<(Vec<f32>, f64)> {
         check("reference_mm", reference_mm, f64::MIN_POSITIVE)?;
         if integral.samples > MAX_SAMPLES {
-            return Err(Error::Limit {
+            return Err(cao_model::Error::Limit {
                 what: "samples of a reference's ray".into(),
                 needed: integral.samples.into(),
                 limit: MAX_SAMPLES.into(),
                 hint: "make the radius smaller or take fewer steps a voxel".into(),
-            });
+            }
+            .into());
         }
         if positions.is_empty() {
             return Ok((Vec::new(), 0.0));

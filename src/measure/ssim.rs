@@ -13,7 +13,7 @@
 //! * values below 0, of voxels whose structures are opposed: here kept; the authors' program takes them for 0;
 //! * the constants: c1 = 0.01 and c2 = 0.03 as printed, while that program squares them as Wang does. See [`Constants`].
 
-use crate::cpu::Grid;
+use cao_twin::Grid;
 
 /// c1 and c2, for values in 0 … 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +100,7 @@ fn blur(grid: &Grid, field: &mut Vec<f64>, axis: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::random::Random;
+    use crate::random::Random;
 
     fn close(found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-9, "{found} {expected}");

@@ -2,15 +2,16 @@
 
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-use cao::clip::{Clip, Mode, Pose, Shape};
-use cao::cpu::Grid;
-use cao::gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
-use cao::measure::random::Random;
-use cao::mesh::TriangleMesh;
-use cao::method::volumes::volume_image;
-use cao::stage::field::Field;
-use cao::transfer::TransferFunction;
-use cao::volume::{Values, Volume};
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_twin::Grid;
+use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
+use cao_measure::random::Random;
+use cao_model::mesh::TriangleMesh;
+use cao::cast::volumes::volume_image;
+use cao::field::Field;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use glam::Vec3;
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -154,7 +155,7 @@ pub fn through_obj(mesh: &TriangleMesh) -> TriangleMesh {
     for t in &mesh.triangles {
         writeln!(text, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap();
     }
-    TriangleMesh::parse_obj(mesh.name.as_str(), &text).unwrap()
+    cao_formats::obj::parse(mesh.name.as_str(), &text).unwrap()
 }
 
 /// A convex mesh from an OBJ file: a ball of 320 triangles.

@@ -5,7 +5,7 @@
 #[path = "../../spirv/compile/mod.rs"]
 pub mod compile;
 
-use cao::gpu::{Bind, Buffer, BufferUse, Format, Gpu, OpenOptions, Shader, shader};
+use cao_gpu::{Bind, Buffer, BufferUse, Format, Gpu, OpenOptions, Shader, shader};
 use compile::{Bounds, Options, reflect};
 
 /// A device under core and synchronization validation. Tests end with [`close`].

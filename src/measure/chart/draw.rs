@@ -5,8 +5,8 @@
 
 use super::front::front;
 use super::{Change, Chart, Point, SceneChart};
-use crate::measure::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
-use crate::occlusion::Quadrature;
+use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
+use cao_model::occlusion::Quadrature;
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
 const COLOURS: [&str; 6] = ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73"];

@@ -17,16 +17,17 @@ use super::contender::{self, Ambient, Asked, BASELINE, Change, Contender, Entry,
 use super::error::{Errors, errors, shape_errors};
 use super::reference::{self, Reference};
 use super::ssim::{Constants, ssim_3d};
-use crate::clip::{Clip, Pose, Shape};
-use crate::cpu::Grid;
-use crate::gpu::{DeviceKind, Gpu, Timings};
-use crate::mesh::TriangleMesh;
-use crate::occlusion::{Occlusion, RaySet};
-use crate::renderer::{COLOUR, Categories, Renderer, Setup};
-use crate::stage::eyes::Look;
-use crate::view::{StereoRig, View};
-use crate::volume::Volume;
 use crate::{Error, Result};
+use cao::renderer::{COLOUR, Categories, Renderer};
+use cao_gpu::{DeviceKind, Gpu, Timings};
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::look::Look;
+use cao_model::mesh::TriangleMesh;
+use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::settings::Setup;
+use cao_model::view::{StereoRig, View};
+use cao_model::volume::Volume;
+use cao_twin::Grid;
 use glam::{Vec2, Vec3};
 use pictures::Shown;
 use std::sync::Arc;
@@ -243,7 +244,7 @@ pub fn measure(
 ) -> Result<Chart> {
     if plan.runs == 0 || plan.size.contains(&0) {
         let problem = format!("{} runs, images of {:?}; expected at least 1 of each", plan.runs, plan.size);
-        return Err(Error::Config { what: "chart".into(), problem });
+        return Err(Error::refused("chart", problem));
     }
     let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(scene, plan)).sum() };
     let mut measured = Vec::new();
@@ -324,7 +325,7 @@ fn one(
                 "nothing to measure after {}: no voxel has opacity; choose another transfer function or clip",
                 change.name()
             );
-            return Err(Error::Config { what: scene.name.clone(), problem });
+            return Err(Error::refused(&scene.name, problem));
         }
         truths.push(truth);
         work.done += Work::reference(scene, plan);
@@ -374,7 +375,7 @@ fn one(
 }
 
 fn no_baseline() -> Error {
-    Error::Config { what: "chart".into(), problem: format!("no contender is {BASELINE} with 26 rays") }
+    Error::refused("chart", format!("no contender is {BASELINE} with 26 rays"))
 }
 
 /// The points of each contender for all changes, contender by contender; the draw times of each method's first; pictures of those that are
@@ -419,7 +420,7 @@ fn compete_in(
                     of_baseline = total_ms;
                     if total_ms <= 0.0 {
                         let problem = "the device's queue has no timestamps; choose another with --device";
-                        return Err(Error::Config { what: "chart".into(), problem: problem.into() });
+                        return Err(Error::refused("chart", problem));
                     }
                 }
                 let run = Run { stages, total_ms, ratio: total_ms / of_baseline };
@@ -475,7 +476,7 @@ struct Known {
 impl<'a> Stand<'a> {
     fn new(subject: Subject<'a>, scene: &'a Scene) -> Result<Self> {
         // Rays as few as can be: only the opacity and the categories are of interest.
-        let paper = Setup::paper(scene.volume.min_spacing());
+        let paper = Setup::of(cao_model::methods::Method::Cao, scene.volume.min_spacing());
         let occlusion = Occlusion { rays: RaySet::R6, radius_mm: scene.state.radius_mm, ..paper.occlusion };
         let setup = Setup { occlusion, ..paper };
         let transfer = scene.state.transfer.clone();

@@ -64,9 +64,11 @@ impl Peers {
     /// # Errors
     /// [`Error::Config`] naming line and key.
     pub fn parse(text: &str) -> Result<Self> {
-        serde_json::from_str(text).map_err(|error| Error::Config {
-            what: "peers".into(),
-            problem: format!("{error}; expected the peers.json that tools/peers -o DIR writes"),
+        serde_json::from_str(text).map_err(|error| {
+            Error::refused(
+                "peers",
+                format!("{error}; expected the peers.json that tools/peers -o DIR writes"),
+            )
         })
     }
 }

@@ -2,11 +2,11 @@
 //! that it shows.
 
 use super::{Ambient, Entry, Known, Setting};
-use crate::cpu::{Grid, trilinear_clamped};
-use crate::measure::error::{Errors, errors};
-use crate::occlusion::Quadrature;
-use crate::picture::Picture;
-use crate::renderer::StereoImage;
+use crate::error::{Errors, errors};
+use cao::renderer::StereoImage;
+use cao_formats::Picture;
+use cao_model::occlusion::Quadrature;
+use cao_twin::{Grid, trilinear_clamped};
 
 /// One method's pictures.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use super::pictures::{SATURATED, Shown};
 use super::tables::{self, escaped};
 use super::{Change, Chart};
 use crate::Result;
-use crate::measure::plot::Drawing;
+use crate::plot::Drawing;
 use std::fmt::Write as _;
 
 const STYLE: &str = "

@@ -3,7 +3,7 @@
 use super::draw::{self, Mark, with_spread};
 use super::peers::Peers;
 use super::{BASELINE, Change, Chart, Point, SceneChart};
-use crate::measure::plot::{Anchor, Drawing, INK, short, text_width};
+use crate::plot::{Anchor, Drawing, INK, short, text_width};
 use std::fmt::Write as _;
 
 /// CAO Table 1: author, name, quality, real-time modification to radius, transfer function, clipping.
@@ -191,7 +191,7 @@ fn drawing(scene: &SceneChart, method: &str) -> f64 {
 /// The frame of a method with the paper's sum and so many equal rays.
 fn frame(scene: &SceneChart, method: &str, rays: &str) -> Option<FrameParts> {
     let own = |p: &&Point| {
-        let left = p.setting.quadrature == Some(crate::occlusion::Quadrature::Left);
+        let left = p.setting.quadrature == Some(cao_model::occlusion::Quadrature::Left);
         p.change == Change::Clip && p.method == method && p.setting.label == rays && left
     };
     let point = scene.points.iter().find(own)?;

@@ -2,10 +2,10 @@
 //! b, transparent or not, equal weights, the sum as printed. It leaves voxels stale, which its error shows.
 
 use super::{Asked, Entry, rendered};
-use crate::occlusion::{Occlusion, RaySet};
-use crate::renderer::Setup;
-use crate::stage::clips::MapSettings;
-use crate::stage::lao::Scope;
+use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::settings::MapSettings;
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
 
 /// Share of the voxels recomputed, precomputation included, in the mean over the kinds of change.
 const RECOMPUTED: f64 = 1.0;
@@ -16,7 +16,7 @@ const MAPS: u32 = 128;
 
 /// The paper's four ray sets; for a first look, two.
 pub fn entries(asked: &Asked) -> Vec<Entry> {
-    let paper = Setup::paper(asked.min_spacing);
+    let paper = Setup::of(cao_model::methods::Method::Cao, asked.min_spacing);
     let maps = MapSettings { literal: true, resolution: MAPS, cells: MAPS, ..paper.maps };
     let entry = |&rays: &RaySet| {
         let setup =

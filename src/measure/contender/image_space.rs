@@ -7,10 +7,11 @@
 use super::rendered::{change_to, with_radius};
 use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject, surface_look};
 use crate::Result;
-use crate::gpu::{Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Timings};
-use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use crate::stage::eyes::Look;
-use crate::stage::ssao::Ssao;
+use crate::kernels::ssao::Ssao;
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_gpu::{Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_model::look::Look;
+use cao_model::settings::Setup;
 
 /// A surface hides a point only if it is nearer by more than this many voxels: what the step of the rays that drew it leaves open.
 const BIAS_VOXELS: f64 = 0.25;
@@ -54,7 +55,7 @@ struct ImageSpace<'a> {
 impl<'a> ImageSpace<'a> {
     fn open(subject: Subject<'a>, state: &State, samples: u32) -> Result<Self> {
         let Subject { gpu, volume, size: [width, height], .. } = subject;
-        let setup = with_radius(Setup::paper(volume.min_spacing()), 0.0);
+        let setup = with_radius(Setup::of(cao_model::methods::Method::Cao, volume.min_spacing()), 0.0);
         let mut renderer = Renderer::new(gpu, volume, state.transfer.clone(), setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         let target = |name, format| {
@@ -103,7 +104,7 @@ impl<'a> ImageSpace<'a> {
             self.ssao.record(&mut rec, view, &self.depth, eye as u32, radius, self.samples, bias_mm, to)?;
         }
         rec.end_stage()?;
-        rec.submit_and_wait()
+        Ok(rec.submit_and_wait()?)
     }
 
     /// One a pixel.

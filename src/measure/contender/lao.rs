@@ -1,16 +1,16 @@
 //! `LAO`: a full recomputation of the voxels that a sample with opacity can touch, with every ray set and rule.
 
 use super::{Asked, Entry, rendered};
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::Setup;
-use crate::scene::Method;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Setup;
 
 /// Share of the voxels that a scene usually needs (method.md §5).
 const NEEDED: f64 = 0.2;
 
 /// Every ray set with every rule.
 pub fn entries(asked: &Asked) -> Vec<Entry> {
-    let paper = Setup::paper(asked.min_spacing);
+    let paper = Setup::of(cao_model::methods::Method::Cao, asked.min_spacing);
     let entry = |(rays, quadrature): (RaySet, Quadrature)| {
         let occlusion = Occlusion { rays, quadrature, ..paper.occlusion };
         let setup = Setup { occlusion, method: Method::Lao, ..paper };

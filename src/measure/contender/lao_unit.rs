@@ -2,14 +2,14 @@
 //! voxel, equal weights, the sum as printed.
 
 use super::{Asked, BASELINE, Entry, rendered};
-use crate::occlusion::{Occlusion, RaySet};
-use crate::renderer::Setup;
-use crate::scene::Method;
-use crate::stage::lao::Scope;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
 
 /// The paper's four ray sets.
 pub fn entries(asked: &Asked) -> Vec<Entry> {
-    let paper = Setup::paper(asked.min_spacing);
+    let paper = Setup::of(cao_model::methods::Method::Cao, asked.min_spacing);
     let entry = |rays: RaySet| {
         let occlusion = Occlusion { rays, ..paper.occlusion };
         let setup = Setup { occlusion, method: Method::Lao, scope: Scope::All, ..paper };

@@ -14,14 +14,14 @@ mod solid;
 mod sweep;
 
 use crate::Result;
-use crate::clip::Clip;
-use crate::gpu::{Gpu, Timings};
-use crate::occlusion::{Occlusion, Quadrature};
-use crate::renderer::StereoImage;
-use crate::stage::eyes::Look;
-use crate::transfer::TransferFunction;
-use crate::view::View;
-use crate::volume::Volume;
+use ::cao::renderer::StereoImage;
+use cao_gpu::{Gpu, Timings};
+use cao_model::clip::Clip;
+use cao_model::look::Look;
+use cao_model::occlusion::{Occlusion, Quadrature};
+use cao_model::transfer::TransferFunction;
+use cao_model::view::View;
+use cao_model::volume::Volume;
 
 /// Every method, in the order of the legend.
 const METHODS: [fn(&Asked) -> Vec<Entry>; 7] = [

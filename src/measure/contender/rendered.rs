@@ -2,10 +2,11 @@
 
 use super::{Ambient, Change, Contender, Entry, Setting, State, Subject};
 use crate::Result;
-use crate::gpu::Timings;
-use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use crate::scene::Method;
-use crate::stage::eyes::Look;
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_gpu::Timings;
+use cao_model::look::Look;
+use cao_model::methods::Method;
+use cao_model::settings::Setup;
 
 /// A method at the setting that `setup` and `details` say.
 pub fn entry(method: &'static str, setup: Setup, min_spacing: f64, details: &str, work: f64) -> Entry {
@@ -67,6 +68,6 @@ impl Contender for Rendered<'_> {
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        self.renderer.draw(self.subject.views, look, self.subject.size)
+        Ok(self.renderer.draw(self.subject.views, look, self.subject.size)?)
     }
 }

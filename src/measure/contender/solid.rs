@@ -3,9 +3,10 @@
 use super::rendered::{change_to, with_radius};
 use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject};
 use crate::Result;
-use crate::gpu::Timings;
-use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use crate::stage::eyes::Look;
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_gpu::Timings;
+use cao_model::look::Look;
+use cao_model::settings::Setup;
 
 /// The one setting.
 pub fn entries(_: &Asked) -> Vec<Entry> {
@@ -26,7 +27,8 @@ struct Solid<'a> {
 impl<'a> Solid<'a> {
     fn open(subject: Subject<'a>, state: &State) -> Result<Self> {
         // Without a neighbourhood nothing is occluded.
-        let setup = with_radius(Setup::paper(subject.volume.min_spacing()), 0.0);
+        let setup =
+            with_radius(Setup::of(cao_model::methods::Method::Cao, subject.volume.min_spacing()), 0.0);
         let (transfer, volume) = (state.transfer.clone(), subject.volume);
         let mut renderer = Renderer::new(subject.gpu, volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
@@ -50,6 +52,6 @@ impl Contender for Solid<'_> {
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
         let look = Look { occluded: false, ..*look };
-        self.renderer.draw(self.subject.views, &look, self.subject.size)
+        Ok(self.renderer.draw(self.subject.views, &look, self.subject.size)?)
     }
 }

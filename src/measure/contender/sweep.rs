@@ -1,16 +1,16 @@
 //! `sweep`: line sweeps along lattice directions, only where opacities changed (method.md §4, §5.2).
 
 use super::{Asked, Entry, Setting, rendered};
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::Setup;
-use crate::scene::Method;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Setup;
 
 /// Cost of a direction in rays cast from every voxel: what a sweep saves.
 const RAY: f64 = 0.01;
 
 /// Every ray set with exact weights; two of them also with finer samples.
 pub fn entries(asked: &Asked) -> Vec<Entry> {
-    let paper = Setup::paper(asked.min_spacing);
+    let paper = Setup::of(cao_model::methods::Method::Cao, asked.min_spacing);
     let voxel = asked.min_spacing as f32;
     let mut settings: Vec<(RaySet, Option<f32>)> =
         [RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50].map(|rays| (rays, None)).to_vec();

@@ -7,11 +7,11 @@
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
-use crate::cpu::Grid;
-use crate::cpu::lao::lao_at;
-use crate::cpu::reference::reference;
-use crate::measure::plot::short;
-use crate::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use crate::plot::short;
+use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_twin::Grid;
+use cao_twin::cast::lao::lao_at;
+use cao_twin::measure::reference::reference;
 
 /// Values of the sweep.
 #[derive(Clone, Debug)]

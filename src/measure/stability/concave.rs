@@ -3,15 +3,15 @@
 //! Control: P pairs are peeled and the rest is left out without a word, as a fixed number of layers does; the paper's is one,
 //! for convex meshes. Ours counts what is missing and refuses.
 
-use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, as_twin, evenly};
 use crate::Result;
-use crate::clip::ClipCamera;
-use crate::cpu::clips::MeshLayers;
-use crate::cpu::peel::peel;
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::mesh::TriangleMesh;
-use crate::stage::peel::{MAX_PAIRS, Peel};
+use crate::plot::short;
+use cao::clip::peel::{MAX_PAIRS, Peel};
+use cao_gpu::Gpu;
+use cao_model::clip::ClipCamera;
+use cao_model::mesh::TriangleMesh;
+use cao_twin::clip::clips::MeshLayers;
+use cao_twin::clip::peel::peel;
 use glam::Vec3;
 
 /// Sizes of the sweep.
@@ -57,9 +57,9 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             lacking += u32::from(pairs < *needed);
             let mine = &mut ours[pairs as usize - 1];
             match peeler.run(gpu, mesh, Vec3::ONE, camera, pairs) {
-                Ok(layers) => *mine = mine.max(wrong(mesh, &all, &MeshLayers::from(&layers), plan.points)),
-                Err(crate::Error::Mesh { .. }) => refused += 1,
-                Err(other) => return Err(other),
+                Ok(layers) => *mine = mine.max(wrong(mesh, &all, &as_twin(&layers), plan.points)),
+                Err(cao::Error::Model(cao_model::Error::Mesh { .. })) => refused += 1,
+                Err(other) => return Err(other.into()),
             }
         }
         most_wrong = most_wrong.max(points[0][1]);
@@ -125,7 +125,7 @@ fn comb(count: u32) -> Result<TriangleMesh> {
         positions.extend(plate.vertices.iter().map(|v| Vec3::new(v.x, v.y, 0.3 * v.z + n as f32)));
         faces.extend(plate.triangles.iter().map(|t| t.map(|i| i + first)));
     }
-    TriangleMesh::new(format!("comb of {count}"), &positions, &faces)
+    Ok(TriangleMesh::new(format!("comb of {count}"), &positions, &faces)?)
 }
 
 /// Points on which the two disagree, in % of the points inside the first.

@@ -7,15 +7,16 @@
 use super::plane_cut::PlaneCut;
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
-use crate::cpu::clips::{ClipField, Dilation, Maps};
-use crate::cpu::raycast::{Frame, raycast};
-use crate::cpu::reference::reference;
-use crate::cpu::trilinear_clamped;
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::measure::reference::{self as truth, image};
-use crate::occlusion::{Integral, Occlusion, Quadrature, RaySet};
-use crate::scene::Shading;
+use crate::plot::short;
+use crate::reference as truth;
+use crate::reference::image;
+use cao_gpu::Gpu;
+use cao_model::look::Look;
+use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_twin::clip::clips::{ClipField, Dilation, Maps};
+use cao_twin::draw::raycast::{Frame, raycast};
+use cao_twin::measure::reference::reference;
+use cao_twin::trilinear_clamped;
 use glam::Vec3;
 
 /// Sizes and values of the sweep.
@@ -179,7 +180,7 @@ fn pictures(
         ambient,
         clips: &clips,
         step_mm: 1.0 / f64::from(truth::Plan::QUICK.steps_per_voxel),
-        shading: Shading { jitter: false, ..Shading::default() },
+        look: Look { jitter: false, ..Look::default() },
     };
     let ([view, _], size) = (cut.views()?, [plan.pixels; 2]);
     let radius = f64::from(RADIUS);

@@ -5,23 +5,23 @@
 //! the twins: V_AO of the clipped volume, fully computed, against V_PAO. Control: the published recipe, with 32-bit depths
 //! and with the half floats of its authors' program. Maps are evaluated where a voxel changed, which is all that counts, so that the largest take seconds.
 
-use super::{Chart, Effort, Finding, Ours, Quantity, Series};
+use super::{Chart, Effort, Finding, Ours, Quantity, Series, as_twin};
 use crate::Result;
-use crate::clip::{Clip, ClipCamera, Mode, Pose, Shape};
-use crate::cpu::classify::sample_positions;
-use crate::cpu::clips::MeshLayers;
-use crate::cpu::dilate::{Cells, changed_radius};
-use crate::cpu::lao::lao_at;
-use crate::cpu::{Grid, each};
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::mesh::TriangleMesh;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::{COLOUR, Renderer, Setup};
-use crate::stage::clips::MapSettings;
-use crate::stage::peel::Peel;
-use crate::transfer::TransferFunction;
-use crate::volume::builtin::builtin_box;
+use crate::plot::short;
+use cao::clip::peel::Peel;
+use cao::renderer::{COLOUR, Renderer};
+use cao_gpu::Gpu;
+use cao_model::builtin::builtin_box;
+use cao_model::clip::{Clip, ClipCamera, Mode, Pose, Shape};
+use cao_model::mesh::TriangleMesh;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::MapSettings;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_twin::cast::lao::lao_at;
+use cao_twin::clip::classify::sample_positions;
+use cao_twin::clip::dilate::{Cells, changed_radius};
+use cao_twin::{Grid, each};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -63,7 +63,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         offset_mm: None,
         step_mm: None,
     };
-    let setup = Setup { occlusion, ..Setup::paper(1.0) };
+    let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;
     renderer.update(&mut |_| ())?;
     let grid = Grid { dims: volume.dims, spacing: volume.spacing };
@@ -197,7 +197,7 @@ impl Scene {
             }
         };
         let camera = ClipCamera::around(mesh, clip.pose.scale, margin, resolution);
-        let layers = MeshLayers::from(&peel.run(gpu, mesh, clip.pose.scale, camera, 4)?);
+        let layers = as_twin(&peel.run(gpu, mesh, clip.pose.scale, camera, 4)?);
 
         let positions = sample_positions(32);
         let to_rigid = clip.pose.rotation().transpose();

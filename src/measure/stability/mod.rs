@@ -19,10 +19,10 @@ pub mod stereo;
 pub mod views;
 
 use crate::Result;
-use crate::cpu::clips::{MeshLayers, NO_BACK, NO_FRONT};
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::stage::peel::Layers;
+use crate::plot::short;
+use cao::clip::peel::Layers;
+use cao_gpu::Gpu;
+use cao_twin::clip::clips::{MeshLayers, NO_BACK, NO_FRONT};
 
 /// How long a sweep may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -233,23 +233,21 @@ pub const SWEEPS: [Sweep; 10] = [
 impl Sweep {
     /// The sweep called `name`.
     pub fn parse(name: &str) -> Result<Self> {
-        SWEEPS.into_iter().find(|sweep| sweep.name == name).ok_or_else(|| crate::Error::Config {
-            what: "sweep".into(),
-            problem: format!("\"{name}\" is none; there are {}", SWEEPS.map(|sweep| sweep.name).join(", ")),
+        SWEEPS.into_iter().find(|sweep| sweep.name == name).ok_or_else(|| {
+            let names = SWEEPS.map(|sweep| sweep.name).join(", ");
+            crate::Error::refused("sweep", format!("\"{name}\" is none; there are {names}"))
         })
     }
 }
 
 /// The device's depth layers in the form of the twins', whose empty pixels hide nothing.
-impl From<&Layers> for MeshLayers {
-    fn from(layers: &Layers) -> Self {
-        let pixels = (layers.camera.resolution * layers.camera.resolution) as usize;
-        let map = |side: usize, none: f32| -> Vec<Vec<f32>> {
-            let of = |map: &[f32]| map.iter().map(|&z| if z < 1.0 { z } else { none }).collect();
-            layers.depth.chunks(pixels).skip(side).step_by(2).map(of).collect()
-        };
-        Self { camera: layers.camera, front: map(0, NO_FRONT), back: map(1, NO_BACK) }
-    }
+fn as_twin(layers: &Layers) -> MeshLayers {
+    let pixels = (layers.camera.resolution * layers.camera.resolution) as usize;
+    let map = |side: usize, none: f32| -> Vec<Vec<f32>> {
+        let of = |map: &[f32]| map.iter().map(|&z| if z < 1.0 { z } else { none }).collect();
+        layers.depth.chunks(pixels).skip(side).step_by(2).map(of).collect()
+    };
+    MeshLayers { camera: layers.camera, front: map(0, NO_FRONT), back: map(1, NO_BACK) }
 }
 
 /// `count` numbers from `low` to `high`, both included.

@@ -8,13 +8,13 @@
 use super::plane_cut::PlaneCut;
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
 use crate::Result;
-use crate::cpu::trilinear_clamped;
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::Setup;
-use crate::stage::classify::AntiAliasing;
-use crate::stage::eyes::Look;
+use crate::plot::short;
+use cao_gpu::Gpu;
+use cao_model::look::Look;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::Setup;
+use cao_twin::trilinear_clamped;
 use glam::Vec3;
 
 /// Sizes and values of the sweep.

@@ -5,18 +5,21 @@
 //! volume.
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
-use crate::cpu::Grid;
-use crate::cpu::lao::lao;
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::{COLOUR, Renderer, Setup};
-use crate::scene::Method;
-use crate::stage::lao::Scope;
-use crate::transfer::TransferFunction;
-use crate::volume::builtin::builtin_box;
-use crate::volume::{Values, Volume, read, write_nrrd};
+use crate::plot::short;
 use crate::{Error, Result};
+use cao::renderer::{COLOUR, Renderer};
+use cao_formats::{read, write_nrrd};
+use cao_gpu::Gpu;
+use cao_model::builtin::builtin_box;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
+use cao_twin::Grid;
+use cao_twin::cast::lao::lao;
 
 /// Sizes and values of the sweep.
 #[derive(Clone, Debug)]
@@ -195,15 +198,20 @@ fn occlusion(quadrature: Quadrature, radius_mm: f32) -> Occlusion {
 fn renderer(gpu: &Gpu, volume: &Volume, occlusion: Occlusion) -> Result<Renderer> {
     let transfer = TransferFunction::new(vec![[0.0, 0.0], [1.0, 1.0]], WHITE.to_vec(), None)?;
     let method = Method::Lao;
-    let setup = Setup { occlusion, scope: Scope::All, method, ..Setup::paper(volume.min_spacing()) };
-    Renderer::new(gpu, volume, transfer, setup, COLOUR)
+    let setup = Setup {
+        occlusion,
+        scope: Scope::All,
+        method,
+        ..Setup::of(cao_model::methods::Method::Cao, volume.min_spacing())
+    };
+    Ok(Renderer::new(gpu, volume, transfer, setup, COLOUR)?)
 }
 
 /// Every voxel's ambient factor, computed so.
 fn computed(renderer: &mut Renderer, occlusion: Occlusion) -> Result<Vec<f32>> {
     renderer.set_setup(Setup { occlusion, ..*renderer.setup() })?;
     renderer.update(&mut |_| ())?;
-    renderer.read_ambient()
+    Ok(renderer.read_ambient()?)
 }
 
 /// For one opacity 1 − q everywhere and M samples of a step of the reference length (method.md §3).
@@ -231,9 +239,10 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
         tick();
         let outcome = match outcome {
             Ok(outcome) => outcome,
-            Err(error @ (Error::Config { .. } | Error::File { .. } | Error::Limit { .. })) => {
+            Err(error @ Error::Formats(cao_formats::Error::File { .. })) => {
                 Outcome::Refused(error.to_string())
             }
+            Err(error) if error.of_data().is_some() => Outcome::Refused(error.to_string()),
             Err(other) => return Err(other),
         };
         found.push((name.to_owned(), outcome));
@@ -288,7 +297,7 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
         case(&in_file, through_file(&solid, &values).map(|_| taken()))?;
         case(
             &format!("{name} in memory"),
-            Volume::new(solid.dims, [1.0; 3], Values::F32(values)).map(|_| taken()),
+            Volume::new(solid.dims, [1.0; 3], Values::F32(values)).map(|_| taken()).map_err(Into::into),
         )?;
     }
     Ok(found)
@@ -303,8 +312,8 @@ fn through_file(like: &Volume, values: &[f32]) -> Result<Volume> {
     let _ = std::fs::remove_file(&path);
     volume.map_err(|error| match error {
         // The path is of no interest, and another every time.
-        Error::File { field, problem, .. } => Error::Config { what: format!("file: {field}"), problem },
-        other => other,
+        cao_formats::Error::File { field, problem, .. } => Error::refused(&format!("file: {field}"), problem),
+        other => other.into(),
     })
 }
 

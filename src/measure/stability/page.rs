@@ -1,7 +1,7 @@
 //! A finding as files: its data as CSV, its charts as drawings, and all of them on one page of HTML that needs no other file.
 
 use super::{Chart, Finding, Ours, Quantity, Role, Series, Sweep};
-use crate::measure::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, text_width};
+use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, text_width};
 use std::fmt::Write as _;
 
 /// Size of a chart in pixels without its legend.

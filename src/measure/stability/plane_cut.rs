@@ -2,15 +2,16 @@
 //! and of cut faces look at.
 
 use crate::Result;
-use crate::clip::{Clip, Pose, Shape};
-use crate::cpu::{Grid, trilinear};
-use crate::gpu::Gpu;
-use crate::occlusion::Occlusion;
-use crate::renderer::{COLOUR, Renderer, Setup};
-use crate::transfer::TransferFunction;
-use crate::view::{StereoRig, View};
-use crate::volume::Volume;
-use crate::volume::builtin::builtin_box;
+use cao::renderer::{COLOUR, Renderer};
+use cao_gpu::Gpu;
+use cao_model::builtin::builtin_box;
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::occlusion::Occlusion;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, View};
+use cao_model::volume::Volume;
+use cao_twin::{Grid, trilinear};
 use glam::Vec3;
 
 /// Opacity from which a point belongs to the object's inside.
@@ -39,7 +40,7 @@ impl PlaneCut {
     pub fn new(gpu: &Gpu, edge: usize, occlusion: Occlusion, way: usize) -> Result<Self> {
         let volume = builtin_box("engine", [edge; 3], [1.0; 3])?;
         let grid = Grid { dims: volume.dims, spacing: volume.spacing };
-        let setup = Setup { occlusion, ..Setup::paper(1.0) };
+        let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
         let transfer = TransferFunction::preset("auto", volume.range())?;
         let mut renderer = Renderer::new(gpu, &volume, transfer.clone(), setup, COLOUR)?;
         renderer.update(&mut |_| ())?;
@@ -80,6 +81,6 @@ impl PlaneCut {
     pub fn views(&self) -> Result<[View; 2]> {
         let size = self.volume.size_mm();
         let rig = StereoRig { ipd_mm: 0.0, ..StereoRig::framing(size, 90.0, 0.0) };
-        rig.views(1.0, 1.0, 20.0 * size[0] as f32)
+        Ok(rig.views(1.0, 1.0, 20.0 * size[0] as f32)?)
     }
 }

@@ -6,12 +6,12 @@
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
-use crate::cpu::lao::lao_at;
-use crate::cpu::{Grid, each};
-use crate::measure::plot::short;
-use crate::measure::random::Random;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::volume::builtin::builtin_box;
+use crate::plot::short;
+use crate::random::Random;
+use cao_model::builtin::builtin_box;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_twin::cast::lao::lao_at;
+use cao_twin::{Grid, each};
 
 /// Sizes and values of the sweep.
 #[derive(Clone, Debug)]

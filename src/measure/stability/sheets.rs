@@ -6,12 +6,12 @@
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
-use crate::cpu::Grid;
-use crate::cpu::lao::lao_at;
-use crate::cpu::reference::reference;
-use crate::measure::plot::short;
-use crate::measure::random::Random;
-use crate::occlusion::{Integral, Occlusion, Quadrature, RaySet, fibonacci};
+use crate::plot::short;
+use crate::random::Random;
+use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet, fibonacci};
+use cao_twin::Grid;
+use cao_twin::cast::lao::lao_at;
+use cao_twin::measure::reference::reference;
 
 /// Sizes and values of the sweep.
 #[derive(Clone, Debug)]

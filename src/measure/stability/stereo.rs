@@ -6,16 +6,17 @@
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly, mean, quantile};
 use crate::Result;
-use crate::clip::{Clip, Pose, Shape};
-use crate::cpu::ssao::{Settings, ssao};
-use crate::gpu::Gpu;
-use crate::measure::plot::short;
-use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use crate::stage::eyes::Look;
-use crate::transfer::TransferFunction;
-use crate::view::{StereoRig, View};
-use crate::volume::Volume;
-use crate::volume::builtin::builtin_box;
+use crate::plot::short;
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_gpu::Gpu;
+use cao_model::builtin::builtin_box;
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::look::Look;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, View};
+use cao_model::volume::Volume;
+use cao_twin::measure::ssao::{Settings, ssao};
 use glam::{Vec2, Vec3};
 
 /// Sizes and values of the sweep.
@@ -53,7 +54,7 @@ const ADULT_MM: f64 = 63.0;
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let voxel = SIZE_MM / plan.edge as f64;
     let volume = builtin_box("engine", [plan.edge; 3], [voxel; 3])?;
-    let mut setup = Setup::paper(voxel);
+    let mut setup = Setup::of(cao_model::methods::Method::Cao, voxel);
     setup.occlusion.radius_mm = RADIUS * voxel as f32;
     let transfer = TransferFunction::preset("auto", volume.range())?;
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;

@@ -6,18 +6,19 @@
 //! asymmetric eyes: a projection that takes them for symmetric, of the same width.
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, tiny};
-use crate::gpu::Gpu;
-use crate::measure::exactness::{Stereo, compare_views};
-use crate::measure::plot::short;
-use crate::measure::random::Random;
-use crate::occlusion::{Occlusion, Quadrature, RaySet};
-use crate::renderer::{COLOUR, Renderer, Setup, StereoImage};
-use crate::stage::eyes::Look;
-use crate::transfer::TransferFunction;
-use crate::view::{StereoRig, Tangents, View};
-use crate::volume::Volume;
-use crate::volume::builtin::builtin_box;
+use crate::exactness::{Stereo, compare_views};
+use crate::plot::short;
+use crate::random::Random;
 use crate::{Error, Result};
+use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao_gpu::Gpu;
+use cao_model::builtin::builtin_box;
+use cao_model::look::Look;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::{StereoRig, Tangents, View};
+use cao_model::volume::Volume;
 use glam::{Vec2, Vec3};
 
 /// Sizes and values of the sweep.
@@ -173,7 +174,7 @@ impl Stage {
             offset_mm: None,
             step_mm: None,
         };
-        let setup = Setup { occlusion, ..Setup::paper(1.0) };
+        let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
         let ready = |volume: &Volume, transfer| {
             let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR)?;
             renderer.update(&mut |_| ())?;
@@ -204,7 +205,7 @@ impl Stage {
     }
 
     fn views(&self, rig: StereoRig) -> Result<[View; 2]> {
-        rig.views(1.0, NEAR * self.half, 20.0 * self.half)
+        Ok(rig.views(1.0, NEAR * self.half, 20.0 * self.half)?)
     }
 
     fn draw(&self, views: &[View; 2]) -> Result<StereoImage> {

@@ -1,0 +1,179 @@
+//! Local ambient occlusion over a list of bricks: CAO eq. (2) and (3),
+//! `A(x) = Σ_k w_k A_k(x)`, `A_k(x) = 1/M Σ_{m=1..M} Π_{i<m} (1 − a_i)`, or one of the better quadratures of method.md §3.
+//! Eq. (3) is printed with a factor 1/K; the w_k here are w_k/K there, with the sum 1.
+//!
+//! In: `opacity` V_o, `list`, and for a contextual update `mask` V_m and `precomputed` V_PAO. Out: `ambient` (3D r32float).
+//! Cost: K·M trilinear samples for each voxel computed.
+//!
+//! One module serves the full computation and the contextual update: a voxel's value depends on nothing but V_o, and one
+//! module has one rounding, so both give the same bits.
+
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use cao_kernels as shaders;
+use cao_model::occlusion::Occlusion;
+use cao_model::settings::Scope;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    samples: u32,
+    bricks: [u32; 3],
+    rays: u32,
+    per_mm: [f32; 3],
+    first: f32,
+    step: f32,
+    exponent: f32,
+    quadrature: u32,
+    flags: u32,
+    base: u32,
+    pad: [u32; 3],
+}
+layout_check!(Params => shaders::lao::LAO_PARAMS {
+    dims, samples, bricks, rays, per_mm, first, step, exponent, quadrature, flags, base
+});
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Rays {
+    ray: [[f32; 4]; 54],
+}
+layout_check!(Rays => shaders::lao::RAYS { ray });
+
+/// How the listed bricks are worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// Every voxel in scope is computed.
+    Full,
+    /// The mask decides (CAO §3.5 step 5): b computed, c from V_PAO, a computed only where it touches a visible voxel.
+    ByMask,
+}
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// V_o, clipped or not.
+    pub opacity: &'a Image,
+    /// Bricks to work on.
+    pub list: &'a BrickList,
+    /// V_m; not read by [`Work::Full`].
+    pub mask: &'a Image,
+    /// V_PAO; not read by [`Work::Full`].
+    pub precomputed: &'a Image,
+    /// V_AO or V_PAO.
+    pub ambient: &'a Image,
+}
+
+/// The kernel `lao` with its ray set.
+pub struct Lao {
+    pipeline: Pipeline,
+    field: Sampler,
+    rays: Buffer,
+}
+
+impl Lao {
+    /// Builds the pipeline.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            pipeline: gpu.compute(&shaders::lao::SHADER, "main")?,
+            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
+            rays: gpu.buffer("rays", size_of::<Rays>() as u64, BufferUse::Device)?,
+        })
+    }
+
+    /// Writes the ray set; once after each change of the settings.
+    pub fn record_rays(&self, rec: &mut Recorder, occlusion: &Occlusion) -> Result<()> {
+        let mut data = Rays::zeroed();
+        for (slot, (unit, weight)) in data.ray.iter_mut().zip(occlusion.rays.unit_vectors()) {
+            *slot = unit.extend(weight).to_array();
+        }
+        rec.barrier(&[Access::UniformRead], &[Access::TransferWrite]);
+        rec.update(&self.rays, 0, bytemuck::bytes_of(&data))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::UniformRead]);
+        Ok(())
+    }
+
+    /// Works on the whole list by one indirect dispatch.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        occlusion: &Occlusion,
+        reference_mm: f32,
+        scope: Scope,
+        work: Work,
+        bindings: Bindings,
+    ) -> Result<()> {
+        let params = params(field, occlusion, reference_mm, scope, work, 0);
+        rec.dispatch_indirect(
+            &self.pipeline,
+            &self.binds(bindings),
+            bytemuck::bytes_of(&params),
+            &bindings.list.buffer,
+            0,
+        )
+    }
+
+    /// Works on `count` bricks of the list from `base`, for callers that split a long computation.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
+    pub fn record_part(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        occlusion: &Occlusion,
+        reference_mm: f32,
+        scope: Scope,
+        work: Work,
+        bindings: Bindings,
+        base: u32,
+        count: u32,
+    ) -> Result<()> {
+        let params = params(field, occlusion, reference_mm, scope, work, base);
+        let groups = crate::stage::row_of_groups(count);
+        rec.dispatch(&self.pipeline, &self.binds(bindings), bytemuck::bytes_of(&params), groups)
+    }
+
+    fn binds<'a>(&'a self, b: Bindings<'a>) -> [(&'static str, Bind<'a>); 7] {
+        [
+            ("opacity", Bind::Image(b.opacity)),
+            ("field", Bind::Sampler(&self.field)),
+            ("rays", Bind::Buffer(&self.rays)),
+            ("list", Bind::Buffer(&b.list.buffer)),
+            ("mask", Bind::Image(b.mask)),
+            ("precomputed", Bind::Image(b.precomputed)),
+            ("ambient", Bind::Image(b.ambient)),
+        ]
+    }
+}
+
+fn params(
+    field: &Field,
+    occlusion: &Occlusion,
+    reference_mm: f32,
+    scope: Scope,
+    work: Work,
+    base: u32,
+) -> Params {
+    let smallest = f64::from(field.min_spacing());
+    let step = occlusion.step(smallest);
+    Params {
+        dims: field.dims,
+        samples: occlusion.samples(smallest),
+        bricks: field.bricks(),
+        rays: occlusion.rays.directions().len() as u32,
+        per_mm: field.spacing.map(f32::recip),
+        first: occlusion.first(smallest),
+        step,
+        exponent: step / reference_mm,
+        quadrature: occlusion.quadrature as u32,
+        flags: u32::from(work == Work::ByMask) | u32::from(scope == Scope::Needed) << 1,
+        base,
+        pad: [0; 3],
+    }
+}

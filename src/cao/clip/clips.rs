@@ -1,0 +1,310 @@
+//! The clips on the device (`spirv/shared/clips.wgsl`): shapes at their poses, and for meshes their depth layers and dilation
+//! maps (CAO §3.2–§3.4).
+//!
+//! The clip camera moves rigidly with a mesh, so its layers are drawn once and serve every translation and rotation; a new
+//! scale, radius or mesh draws them again.
+
+use crate::clip::dilate::Dilate;
+use crate::clip::peel::{Layers, Peel};
+use crate::{Error, Result};
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
+use cao_kernels as shaders;
+use cao_model::clip::{Clip, ClipCamera, Mode, Shape};
+use cao_model::mesh::TriangleMesh;
+use cao_model::settings::MapSettings;
+use glam::Vec3;
+use std::sync::Arc;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ClipData {
+    to_rigid: [[f32; 4]; 3],
+    scale: [f32; 4],
+    corner: [f32; 4],
+    kind: u32,
+    keep: u32,
+    pairs: u32,
+    layers_at: u32,
+    resolution: u32,
+    dilation_at: u32,
+    dilation_resolution: u32,
+    per_depth: f32,
+    cells: [f32; 4],
+    blocks_at: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
+}
+layout_check!(ClipData => shaders::classify::CLIP {
+    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth, cells,
+    blocks_at, pad0, pad1, pad2
+});
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ClipsData {
+    count: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
+    clip: [ClipData; Clip::MAX],
+}
+layout_check!(ClipsData => shaders::classify::CLIPS { count, pad0, pad1, pad2, clip });
+
+/// Where one mesh clip's maps are in the shared buffers.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshClip {
+    /// The clip camera.
+    pub camera: ClipCamera,
+    /// Layer pairs.
+    pub pairs: u32,
+    /// The camera of the dilation maps.
+    pub cells: ClipCamera,
+    /// First f32 of the layers.
+    pub layers_at: u32,
+    /// First f32 of the dilation maps.
+    pub dilation_at: u32,
+    /// First f32 of the bounds of blocks of the layers, behind all layers.
+    pub blocks_at: u32,
+    /// The outside is hidden.
+    pub keep: bool,
+    /// See [`MapSettings::literal`].
+    pub literal: bool,
+}
+
+/// The layers of a mesh at one scale and margin.
+struct Peeled {
+    mesh: Arc<TriangleMesh>,
+    scale: Vec3,
+    margin: f32,
+    settings: MapSettings,
+    layers: Layers,
+}
+
+/// Mesh, scale, whether the outside is hidden, radius of the dilation.
+type Wanted<'a> = (&'a Arc<TriangleMesh>, Vec3, bool, f32);
+
+/// The clips of a scene in device memory.
+pub struct ClipSet {
+    /// Bound as `clips`.
+    pub clips: Buffer,
+    /// Bound as `layers`.
+    pub layers: Buffer,
+    /// Bound as `dilation`.
+    pub dilation: Buffer,
+    peeled: Vec<Peeled>,
+    meshes: Vec<MeshClip>,
+    /// What the maps were made for: shape and side of each mesh clip, radius.
+    made_for: Vec<(Vec3, bool, f32)>,
+}
+
+impl ClipSet {
+    /// No clips.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            clips: gpu.buffer("clips", size_of::<ClipsData>() as u64, BufferUse::Device)?,
+            layers: gpu.buffer("clip layers", 16, BufferUse::Device)?,
+            dilation: gpu.buffer("dilation maps", 16, BufferUse::Device)?,
+            peeled: Vec::new(),
+            meshes: Vec::new(),
+            made_for: Vec::new(),
+        })
+    }
+
+    /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only
+    /// translations and rotations changed. `radius` in mm is the reach of a change (ray length, footprint and sample cell),
+    /// `half_mm` half the volume's diagonal.
+    /// Uses the device's queue and waits for it when there is something to draw; returns the times of the stages.
+    #[expect(clippy::too_many_arguments, reason = "kernels, clips and settings, each named once")]
+    pub fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        peel: &Peel,
+        dilate: &Dilate,
+        clips: &[Clip],
+        radius: f32,
+        half_mm: f32,
+        settings: MapSettings,
+    ) -> Result<Timings> {
+        check(clips)?;
+        settings.check()?;
+        let mut wanted = Vec::new();
+        for clip in clips {
+            if let Shape::Mesh(mesh) = &clip.shape {
+                let rounding = if settings.literal { 0.0 } else { clip.rounding_mm(half_mm, radius) };
+                let radius = radius + rounding;
+                wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep, radius));
+            }
+        }
+        let key: Vec<_> = wanted.iter().map(|&(_, scale, keep, radius)| (scale, keep, radius)).collect();
+        // Only the literal recipe's layers leave room for the dilation.
+        let margin = if settings.literal { radius } else { 0.0 };
+        let same_layers = |have: &Peeled, (mesh, scale, ..): &Wanted| {
+            Arc::ptr_eq(&have.mesh, mesh)
+                && have.scale == *scale
+                && have.margin == margin
+                && have.settings == settings
+        };
+        let unchanged = key == self.made_for
+            && self.peeled.len() == wanted.len()
+            && self.peeled.iter().zip(&wanted).all(|(have, want)| same_layers(have, want));
+        if unchanged {
+            return Ok(Timings::new());
+        }
+        // Nothing is there until all of it is, whatever fails on the way.
+        self.made_for.clear();
+        self.meshes.clear();
+
+        let mut timings = Timings::new();
+        let mut peeled = Vec::new();
+        for want in &wanted {
+            let (mesh, scale, ..) = *want;
+            let found = self.peeled.iter().position(|have| same_layers(have, want));
+            peeled.push(match found {
+                Some(index) => self.peeled.swap_remove(index),
+                None => {
+                    // Front and back layers have their meaning only where faces look outward.
+                    let solid = mesh.outward()?;
+                    let camera = ClipCamera::around(&solid, scale, margin, settings.resolution);
+                    let layers = peel.run(gpu, &solid, scale, camera, settings.pairs)?;
+                    timings.push(("peel".into(), layers.milliseconds));
+                    Peeled { mesh: mesh.clone(), scale, margin, settings, layers }
+                }
+            });
+        }
+        self.peeled = peeled;
+        let mut meshes = Vec::new();
+        let (mut layers_at, mut dilation_at) = (0, 0);
+        for (have, &(_, _, keep, radius)) in self.peeled.iter().zip(&wanted) {
+            let (pairs, camera) = (have.layers.pairs, have.layers.camera);
+            meshes.push(MeshClip {
+                camera,
+                pairs,
+                cells: if settings.literal { camera } else { camera.widened(radius, settings.cells) },
+                layers_at,
+                dilation_at,
+                blocks_at: 0,
+                keep,
+                literal: settings.literal,
+            });
+            layers_at += 2 * pairs * settings.resolution * settings.resolution;
+            dilation_at += 2 * pairs * settings.cells * settings.cells;
+        }
+        if meshes.is_empty() {
+            return Ok(timings);
+        }
+        let mut all: Vec<f32> =
+            self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
+        for (mesh, have) in meshes.iter_mut().zip(&self.peeled) {
+            mesh.blocks_at = all.len() as u32;
+            all.extend(block_bounds(&have.layers.depth, settings.resolution as usize));
+        }
+        self.layers = crate::stage::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
+        self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
+        let most = meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
+        let blocks = Dilate::blocks(gpu, settings.cells, most)?;
+        let mut rec = gpu.recorder("dilate")?;
+        for (mesh, &(.., radius)) in meshes.iter().zip(&wanted) {
+            rec.barrier(
+                &[Access::StorageRead, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
+            rec.stage("dilate")?;
+            dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
+            rec.end_stage()?;
+        }
+        timings.extend(rec.submit_and_wait()?);
+        self.meshes = meshes;
+        self.made_for = key;
+        Ok(timings)
+    }
+
+    /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
+    pub fn record(&self, rec: &mut Recorder, clips: &[Clip], half_mm: f32) -> Result<()> {
+        check(clips)?;
+        let mut data = ClipsData::zeroed();
+        data.count = clips.len() as u32;
+        let mut meshes = self.meshes.iter();
+        for (slot, clip) in data.clip.iter_mut().zip(clips) {
+            let rows = clip.pose.rotation().transpose();
+            let moved = -(rows * clip.pose.translate_mm);
+            slot.to_rigid = std::array::from_fn(|i| rows.row(i).extend(moved[i]).to_array());
+            slot.scale = clip.pose.scale.extend(clip.pose.scale.min_element()).to_array();
+            slot.keep = u32::from(clip.mode == Mode::Keep);
+            slot.cells[3] = clip.rounding_mm(half_mm, 0.0);
+            slot.kind = match &clip.shape {
+                Shape::Plane => 0,
+                Shape::Box => 1,
+                Shape::Sphere => 2,
+                Shape::Cylinder => 3,
+                Shape::Cone => 4,
+                Shape::Torus => 5,
+                Shape::Mesh(mesh) => {
+                    let map = meshes.next().ok_or_else(|| {
+                        Error::refused(&format!("clip {}", mesh.name), "its depth layers were not prepared")
+                    })?;
+                    slot.corner = map.camera.corner.extend(1.0 / map.camera.pixel_mm).to_array();
+                    slot.pairs = map.pairs;
+                    slot.layers_at = map.layers_at;
+                    slot.resolution = map.camera.resolution;
+                    slot.dilation_at = map.dilation_at;
+                    slot.blocks_at = map.blocks_at;
+                    slot.dilation_resolution = map.cells.resolution;
+                    let corner = map.cells.corner;
+                    slot.cells[..3].copy_from_slice(&[corner.x, corner.y, 1.0 / map.cells.pixel_mm]);
+                    slot.per_depth = 1.0 / map.camera.depth_mm;
+                    6
+                }
+            };
+        }
+        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
+        rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
+        Ok(())
+    }
+}
+
+/// Edge in pixels of the blocks of depth layers that `clip_bricks` looks at instead of pixels.
+const BLOCK: usize = 16;
+
+/// Of layers as [`Layers::depth`] has them, for each pair: nearest front, farthest back, farthest front and nearest back
+/// of each block of 16² pixels, rows of y. A pixel with nothing inside counts as front 2 and back −1, behind and before
+/// everything.
+fn block_bounds(depth: &[f32], resolution: usize) -> Vec<f32> {
+    let edge = resolution.div_ceil(BLOCK);
+    let mut bounds = Vec::new();
+    for pair in depth.chunks_exact(2 * resolution * resolution) {
+        let (front, back) = pair.split_at(resolution * resolution);
+        let mut pair = [(); 4].map(|()| Vec::with_capacity(edge * edge));
+        for block in 0..edge * edge {
+            let range = |at: usize| at * BLOCK..((at + 1) * BLOCK).min(resolution);
+            let mut b = [2.0_f32, -1.0, -1.0, 2.0];
+            for pixel in
+                range(block / edge).flat_map(|y| range(block % edge).map(move |x| y * resolution + x))
+            {
+                let (f, k) = match (front[pixel], back[pixel]) {
+                    (f, k) if f < k => (f, k),
+                    _ => (2.0, -1.0),
+                };
+                b = [b[0].min(f), b[1].max(k), b[2].max(f), b[3].min(k)];
+            }
+            pair.iter_mut().zip(b).for_each(|(list, bound)| list.push(bound));
+        }
+        bounds.extend(pair.into_iter().flatten());
+    }
+    bounds
+}
+
+fn check(clips: &[Clip]) -> cao_model::Result<()> {
+    if clips.len() > Clip::MAX {
+        return Err(cao_model::Error::Limit {
+            what: "clips".into(),
+            needed: clips.len() as u64,
+            limit: Clip::MAX as u64,
+            hint: "join meshes into one file, or leave some out".into(),
+        });
+    }
+    clips.iter().try_for_each(|clip| clip.pose.check())
+}

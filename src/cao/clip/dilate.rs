@@ -1,0 +1,86 @@
+//! Dilation maps of a mesh clip (CAO §3.4 step 3, eq. (4)): the Minkowski sum of its depth layers and a sphere, or for a kept
+//! shape the contraction by it.
+//!
+//! In: `layers` (`pairs` × front, back × Z² f32). Out: `dilation` (the same × D² f32), on a wider map. Conservative: maps stand
+//! for cells, distances are between cells, so every point within the radius of any point of the layers is inside; the
+//! literal recipe (D = Z, distances between centres) is kept to show that it is not. Cost: (2·radius/cell)² reads a cell.
+
+use crate::clip::clips::MeshClip;
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder};
+use cao_kernels as shaders;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    resolution: u32,
+    cells: u32,
+    layers_at: u32,
+    dilation_at: u32,
+    radius: f32,
+    cell_mm: f32,
+    depth_mm: f32,
+    flags: u32,
+    first: [f32; 2],
+    per_cell: f32,
+    pad: u32,
+}
+layout_check!(Params => shaders::dilate::DILATE_PARAMS {
+    resolution, cells, layers_at, dilation_at, radius, cell_mm, depth_mm, flags, first, per_cell
+});
+
+/// The kernel `dilate`.
+pub struct Dilate {
+    reduce: Pipeline,
+    main: Pipeline,
+}
+
+impl Dilate {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            reduce: gpu.compute(&shaders::dilate::SHADER, "reduce")?,
+            main: gpu.compute(&shaders::dilate::SHADER, "main")?,
+        })
+    }
+
+    /// Working memory for one mesh: the hulls of the blocks.
+    pub fn blocks(gpu: &Gpu, cells: u32, pairs: u32) -> Result<Buffer> {
+        gpu.buffer("dilation blocks", 8 * u64::from(cells * cells) * u64::from(pairs), BufferUse::Device)
+    }
+
+    /// Fills the dilation maps of one mesh clip for this radius in mm.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        clip: &MeshClip,
+        radius: f32,
+        layers: &Buffer,
+        blocks: &Buffer,
+        dilation: &Buffer,
+    ) -> Result<()> {
+        let camera = clip.camera;
+        let params = Params {
+            resolution: camera.resolution,
+            cells: clip.cells.resolution,
+            layers_at: clip.layers_at,
+            dilation_at: clip.dilation_at,
+            radius,
+            cell_mm: clip.cells.pixel_mm,
+            depth_mm: camera.depth_mm,
+            flags: u32::from(clip.keep) | u32::from(clip.literal) << 1,
+            first: ((clip.cells.corner - camera.corner) / camera.pixel_mm).truncate().to_array(),
+            per_cell: clip.cells.pixel_mm / camera.pixel_mm,
+            pad: 0,
+        };
+        let over = [clip.cells.resolution, clip.cells.resolution, clip.pairs];
+        let push = bytemuck::bytes_of(&params);
+        let binds = [("layers", Bind::Buffer(layers)), ("blocks", Bind::Buffer(blocks))];
+        rec.dispatch_over(&self.reduce, &binds, push, over)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+        let binds = [("blocks", Bind::Buffer(blocks)), ("dilation", Bind::Buffer(dilation))];
+        rec.dispatch_over(&self.main, &binds, push, over)
+    }
+}

@@ -1,0 +1,7 @@
+//! Clips: depth layers and dilation maps of meshes, classification of bricks and voxels.
+
+pub mod classify;
+pub mod clip_bricks;
+pub mod clips;
+pub mod dilate;
+pub mod peel;

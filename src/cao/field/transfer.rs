@@ -1,0 +1,54 @@
+//! The transfer function on the device (`spirv/shared/transfer.wgsl`): its control points, 2 KiB.
+
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
+use cao_kernels as shaders;
+use cao_model::transfer::TransferFunction;
+
+const POINTS: usize = 64;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Transfer {
+    opacity_points: u32,
+    colour_points: u32,
+    pad0: u32,
+    pad1: u32,
+    opacity: [[f32; 4]; POINTS],
+    colour: [[f32; 4]; POINTS],
+}
+layout_check!(Transfer => shaders::opacity::TRANSFER { opacity_points, colour_points, pad0, pad1, opacity, colour });
+
+/// Control points of a transfer function in device memory.
+pub struct TransferBuffer {
+    /// Bound as `transfer`.
+    pub buffer: Buffer,
+}
+
+impl TransferBuffer {
+    /// Memory for any transfer function.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { buffer: gpu.buffer("transfer", size_of::<Transfer>() as u64, BufferUse::Device)? })
+    }
+
+    /// Writes the control points and makes them visible to all shaders.
+    pub fn record(&self, rec: &mut Recorder, function: &TransferFunction) -> Result<()> {
+        let mut data = Transfer::zeroed();
+        data.opacity_points = function.opacity.len() as u32;
+        data.colour_points = function.colour.len() as u32;
+        for (i, &[value, opacity]) in function.opacity.iter().enumerate() {
+            let slope = match function.opacity.get(i + 1) {
+                Some(next) if next[0] > value => (next[1] - opacity) / (next[0] - value),
+                _ => 0.0,
+            };
+            data.opacity[i] = [value, opacity, slope, 0.0];
+        }
+        data.colour[..function.colour.len()].copy_from_slice(&function.colour);
+        rec.barrier(&[Access::StorageRead, Access::GraphicsRead], &[Access::TransferWrite]);
+        rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
+        Ok(())
+    }
+}

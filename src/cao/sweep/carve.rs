@@ -1,0 +1,136 @@
+//! Opacity after transfer function and clips, in place, and which bricks changed (method.md §5.2, §6):
+//! `V_o(x) = C_visible/(N+9) · TF_o(V(x))` (CAO eq. (5)), stored to 1/65535.
+//!
+//! In: `volume`, `transfer`, the clips, the words of [`super::clip_bricks`] now and at the last edit, `occupancy`. In and out:
+//! `opacity` V_o (3D r16unorm), `contact` (where each brick's opacity lies, 27 bits). Out: `change` (f32 a brick: 0 where an
+//! opacity changed, left alone elsewhere), `past` (the changed bricks and what they held before). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
+//! voxel in the others, clip samples only where a clip's surface passes.
+
+use crate::clip::classify::Classify;
+use crate::clip::clips::ClipSet;
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use crate::field::transfer::TransferBuffer;
+use crate::stage::row_of_groups;
+use crate::sweep::past::PastBricks;
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Bind, Buffer, Gpu, Image, Pipeline, Recorder};
+use cao_kernels as shaders;
+use cao_model::settings::AntiAliasing;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    extra_samples: u32,
+    spacing: [f32; 3],
+    all: u32,
+    levels: f32,
+    slope: f32,
+    bias: f32,
+    capacity: u32,
+}
+layout_check!(Params => shaders::carve::CARVE_PARAMS {
+    dims, extra_samples, spacing, all, levels, slope, bias, capacity
+});
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// Opacity and colour.
+    pub transfer: &'a TransferBuffer,
+    /// The clips.
+    pub clips: &'a ClipSet,
+    /// What they do to whole bricks.
+    pub clip_bricks: &'a Buffer,
+    /// The same at the last call.
+    pub clip_bricks_before: &'a Buffer,
+    /// Bricks that can have opacity.
+    pub occupancy: &'a Buffer,
+    /// Where each brick's opacity lies.
+    pub contact: &'a Buffer,
+    /// Squared distance to the nearest changed brick.
+    pub change: &'a Buffer,
+    /// Bricks to work on; filled here.
+    pub list: &'a BrickList,
+    /// Which octants of each brick changed, in bits of [`super::near::CHANGED`] and on; filled here.
+    pub todo: &'a Buffer,
+    /// What changed bricks held before; filled here.
+    pub past: &'a PastBricks,
+    /// V_o.
+    pub opacity: &'a Image,
+}
+
+/// The kernel `carve`.
+pub struct Carve {
+    choose: Pipeline,
+    carve: Pipeline,
+}
+
+impl Carve {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let shader = &shaders::carve::SHADER;
+        Ok(Self { choose: gpu.compute(shader, "list_bricks")?, carve: gpu.compute(shader, "main")? })
+    }
+
+    /// Brings V_o up to date: every brick if `all`, those that clips can have changed otherwise. `positions` are those of
+    /// [`Classify`].
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        samples: AntiAliasing,
+        all: bool,
+        classify: &Classify,
+        b: Bindings,
+    ) -> Result<()> {
+        let Field { dims, spacing, levels, bias, .. } = *field;
+        let slope = field.scale / levels;
+        let params = Params {
+            dims,
+            extra_samples: samples as u32,
+            spacing,
+            all: u32::from(all),
+            levels,
+            slope,
+            bias,
+            capacity: b.past.capacity,
+        };
+        let params = bytemuck::bytes_of(&params);
+        b.list.record_clear(rec)?;
+        b.past.list.record_clear(rec)?;
+        rec.fill(b.todo, 0, b.todo.bytes(), 0)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+        let binds = [
+            ("clip_bricks", Bind::Buffer(b.clip_bricks)),
+            ("clip_bricks_before", Bind::Buffer(b.clip_bricks_before)),
+            ("occupancy", Bind::Buffer(b.occupancy)),
+            ("contact", Bind::Buffer(b.contact)),
+            ("growing", Bind::Buffer(&b.list.buffer)),
+        ];
+        rec.dispatch(&self.choose, &binds, params, row_of_groups(field.brick_count().div_ceil(64)))?;
+        rec.barrier(
+            &[Access::StorageRead, Access::StorageWrite],
+            &[Access::IndirectRead, Access::StorageRead, Access::StorageWrite],
+        );
+        let binds = [
+            ("volume", Bind::Image(&field.volume)),
+            ("transfer", Bind::Buffer(&b.transfer.buffer)),
+            ("clips", Bind::Buffer(&b.clips.clips)),
+            ("layers", Bind::Buffer(&b.clips.layers)),
+            ("positions", Bind::Buffer(&classify.positions)),
+            ("clip_bricks", Bind::Buffer(b.clip_bricks)),
+            ("contact", Bind::Buffer(b.contact)),
+            ("change", Bind::Buffer(b.change)),
+            ("list", Bind::Buffer(&b.list.buffer)),
+            ("changed", Bind::Buffer(&b.past.list.buffer)),
+            ("past", Bind::Buffer(&b.past.opacities)),
+            ("todo", Bind::Buffer(b.todo)),
+            ("opacity", Bind::Image(b.opacity)),
+        ];
+        rec.dispatch_indirect(&self.carve, &binds, params, &b.list.buffer, 0)
+    }
+}

@@ -1,0 +1,132 @@
+//! Bitwise comparison of two ambient volumes on every voxel that has a value (CAO §4: "exactly the same").
+//!
+//! In: `expected`, `actual` (3D r32float or r16unorm), `mask` or `todo`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
+
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{
+    Access, Bind, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline,
+};
+use cao_kernels as shaders;
+use cao_model::settings::Scope;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    dims: [u32; 3],
+    only_needed: u32,
+    bricks: [u32; 3],
+    by_brick: u32,
+}
+layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed, bricks, by_brick });
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Counters {
+    compared: u32,
+    different: u32,
+    largest: u32,
+    recomputed: u32,
+}
+layout_check!(Counters => shaders::compare::DIFFERENCE { compared, different, largest, recomputed });
+
+/// Outcome of a comparison.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Difference {
+    /// Voxels that have a value.
+    pub compared: u64,
+    /// Of these, voxels whose bits are not the same, or that are not within 0 … 1.
+    pub different: u64,
+    /// Largest |expected − actual| among those.
+    pub largest: f32,
+    /// Of the compared, voxels that the contextual update recomputed.
+    pub recomputed: u64,
+}
+
+/// How it is known which voxels were recomputed.
+#[derive(Clone, Copy)]
+pub enum Recomputed<'a> {
+    /// V_m; clipped voxels that touch no visible one have no value.
+    Mask(&'a Image),
+    /// A u32 a brick, 1 where it was.
+    Bricks(&'a Buffer),
+}
+
+/// The kernel `compare`.
+pub struct Compare {
+    pipeline: Pipeline,
+}
+
+impl Compare {
+    /// Builds the pipeline.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { pipeline: gpu.compute(&shaders::compare::SHADER, "main")? })
+    }
+
+    /// Compares two ambient volumes on the bricks of the list that the full computation worked on. Uses the device's queue and waits for it.
+    #[expect(clippy::too_many_arguments, reason = "each is one binding or parameter of the kernel")]
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        field: &Field,
+        scope: Scope,
+        list: &BrickList,
+        opacity: &Image,
+        recomputed: Recomputed,
+        expected: &Image,
+        actual: &Image,
+    ) -> Result<Difference> {
+        let bytes = size_of::<Counters>() as u64;
+        let difference = gpu.buffer("difference", bytes, BufferUse::Device)?;
+        let read_back = gpu.buffer("difference read-back", bytes, BufferUse::Readback)?;
+        let mut rec = gpu.recorder("compare")?;
+        rec.fill(&difference, 0, bytes, 0)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+        let params = Params {
+            dims: field.dims,
+            only_needed: u32::from(scope == Scope::Needed),
+            bricks: field.bricks(),
+            by_brick: u32::from(matches!(recomputed, Recomputed::Bricks(_))),
+        };
+        // What is not read still has to be bound.
+        let no_mask = gpu.image(
+            "no mask",
+            &ImageDesc {
+                dims: [1; 3],
+                layers: 1,
+                format: Format::R8Uint,
+                kind: ImageKind::D3,
+                usage: ImageUse::SAMPLED,
+            },
+        )?;
+        rec.discard(&no_mask);
+        let (mask, todo) = match recomputed {
+            Recomputed::Mask(mask) => (mask, &list.buffer),
+            Recomputed::Bricks(todo) => (&no_mask, todo),
+        };
+        let binds = [
+            ("opacity", Bind::Image(opacity)),
+            ("mask", Bind::Image(mask)),
+            ("expected", Bind::Image(expected)),
+            ("actual", Bind::Image(actual)),
+            ("list", Bind::Buffer(&list.buffer)),
+            ("difference", Bind::Buffer(&difference)),
+            ("todo", Bind::Buffer(todo)),
+        ];
+        rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), &list.buffer, 0)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        rec.copy_buffer(&difference, 0, &read_back, 0, bytes)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        let c: Counters = bytemuck::pod_read_unaligned(&read_back.read(0, bytes)?);
+        Ok(Difference {
+            compared: c.compared.into(),
+            different: c.different.into(),
+            largest: f32::from_bits(c.largest),
+            recomputed: c.recomputed.into(),
+        })
+    }
+}

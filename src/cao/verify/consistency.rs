@@ -1,0 +1,84 @@
+//! Stereo consistency (CAO §5, method.md §7): what each eye reads at given points of the volume.
+//!
+//! In: world points, both eyes, V_o, V_AO. Out: for every point and eye the transmittance in front of it (−1 outside the
+//! image) and the ambient factor that the ray cast reads there. Cost: one ray a point and eye.
+
+use crate::draw::eyes::FrameBuffer;
+use crate::stage::device_buffer;
+use bytemuck::{Pod, Zeroable};
+use cao_gpu::Result;
+use cao_gpu::layout_check;
+use cao_gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
+use cao_kernels as shaders;
+use glam::Vec3;
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Params {
+    count: u32,
+}
+layout_check!(Params => shaders::consistency::CONSISTENCY_PARAMS { count });
+
+/// What one eye reads at one point.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Seen {
+    /// Transmittance between the eye and the point's voxel, 0 … 1; −1 where the point is outside the eye's image.
+    pub transmittance: f32,
+    /// Ambient factor at the point.
+    pub ambient: f32,
+}
+
+/// The kernel `consistency`.
+pub struct Consistency {
+    pipeline: Pipeline,
+    field: Sampler,
+    edge: Sampler,
+}
+
+impl Consistency {
+    /// Builds the pipeline.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self {
+            pipeline: gpu.compute(&shaders::consistency::SHADER, "main")?,
+            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
+            edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
+        })
+    }
+
+    /// What the left and the right eye read at each world point (mm). Uses the device's queue and waits for it.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        frame: &FrameBuffer,
+        opacity: &Image,
+        ambient: &Image,
+        points: &[Vec3],
+    ) -> Result<Vec<[Seen; 2]>> {
+        if points.is_empty() {
+            return Ok(Vec::new());
+        }
+        let world: Vec<[f32; 4]> = points.iter().map(|p| p.extend(1.0).to_array()).collect();
+        let points_buffer = device_buffer(gpu, "points", bytemuck::cast_slice(&world))?;
+        let bytes = size_of::<[Seen; 2]>() as u64 * points.len() as u64;
+        let seen = gpu.buffer("seen", bytes, BufferUse::Device)?;
+        let read_back = gpu.buffer("seen read-back", bytes, BufferUse::Readback)?;
+        let mut rec = gpu.recorder("consistency")?;
+        let params = Params { count: points.len() as u32 };
+        let binds = [
+            ("opacity", Bind::Image(opacity)),
+            ("ambient", Bind::Image(ambient)),
+            ("field", Bind::Sampler(&self.field)),
+            ("edge", Bind::Sampler(&self.edge)),
+            ("frame", Bind::Buffer(&frame.buffer)),
+            ("points", Bind::Buffer(&points_buffer)),
+            ("seen", Bind::Buffer(&seen)),
+        ];
+        rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), [params.count, 1, 1])?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        rec.copy_buffer(&seen, 0, &read_back, 0, bytes)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        Ok(bytemuck::pod_collect_to_vec(&read_back.read(0, bytes)?))
+    }
+}

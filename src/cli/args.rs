@@ -1,0 +1,173 @@
+//! Flags that the programs share, and what they mean.
+
+use anyhow::{Context, Result};
+use cao_formats::scene::VolumeSource;
+use cao_model::clip::Shape;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Quadrature, RaySet};
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
+use cao_model::values::Endian;
+use cao_model::volume::Volume;
+use clap::Args;
+use std::fmt::Display;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// Flags that contradict each other, beyond what the parser of the command line can tell: exit code 2.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(String);
+
+/// A [`Usage`] error.
+pub fn usage(problem: impl Into<String>) -> anyhow::Error {
+    Usage(problem.into()).into()
+}
+
+#[derive(Args)]
+pub struct Global {
+    /// Device to use: its number or part of its name, as `cao devices` lists them [env: CAO_DEVICE]
+    #[arg(long, global = true, help_heading = "Everywhere")]
+    pub device: Option<String>,
+    /// Run under the Vulkan validation layer and fail if it reports anything [env: CAO_VALIDATION=1]
+    #[arg(long, global = true, help_heading = "Everywhere")]
+    pub validate: bool,
+    /// Print one JSON object instead of text
+    #[arg(long, global = true, help_heading = "Everywhere")]
+    pub json: bool,
+}
+
+/// How to read a file that holds nothing but values.
+#[derive(Args)]
+#[command(next_help_heading = "Raw data")]
+pub struct Raw {
+    /// The input is raw values: voxels along x, y, z, x fastest
+    #[arg(long, value_name = "X,Y,Z", value_parser = dims, requires = "kind")]
+    pub dims: Option<[usize; 3]>,
+    /// Type of the values, such as uint8, int16, float32
+    #[arg(long = "type", value_name = "TYPE", requires = "dims")]
+    pub kind: Option<String>,
+    /// Distance of voxel centres in mm [default: 1,1,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = triple::<f64>, allow_hyphen_values = true, requires = "dims")]
+    pub spacing: Option<[f64; 3]>,
+    /// Order of a value's bytes: little or big [default: little]
+    #[arg(long, value_name = "ORDER", value_parser = endian, requires = "dims")]
+    pub endian: Option<Endian>,
+}
+
+/// How occlusion is computed.
+#[derive(Args)]
+#[command(next_help_heading = "Occlusion")]
+pub struct Settings {
+    /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
+    #[arg(long, value_name = "FILE|PRESET")]
+    pub transfer: Option<String>,
+    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26; of sweeps 26w]
+    #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
+    pub rays: Option<RaySet>,
+    /// Rule along a ray: left (the paper's sum), cell, segment [default: left; of sweeps segment, their only one]
+    #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
+    pub quadrature: Option<Quadrature>,
+    /// Length of the rays in mm [default: 20 times the smallest spacing]
+    #[arg(long, value_name = "R", value_parser = length, allow_hyphen_values = true)]
+    pub radius_mm: Option<f32>,
+    /// Distance from the voxel's centre in mm at which they start [default: half a step]
+    #[arg(long, value_name = "O", value_parser = length, allow_hyphen_values = true)]
+    pub offset_mm: Option<f32>,
+    /// Distance in mm between their samples, of sweeps at most [default: the smallest spacing; of sweeps 1.75 times that, with 50w and 54 1.45 times]
+    #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
+    pub step_mm: Option<f32>,
+}
+
+impl Raw {
+    /// What the user means by the name of a volume.
+    pub fn source(&self, input: &str) -> Result<VolumeSource> {
+        let source = VolumeSource::parse(input);
+        match (self.dims, &self.kind, source) {
+            (Some(dims), Some(kind), VolumeSource::File(path)) => Ok(VolumeSource::Raw {
+                path,
+                dims,
+                kind: kind.clone(),
+                spacing_mm: self.spacing.unwrap_or([1.0; 3]),
+                big_endian: self.endian == Some(Endian::Big),
+            }),
+            (Some(_), ..) => Err(usage(format!("--dims: {input} has dimensions of its own"))),
+            (None, _, source) => Ok(source),
+        }
+    }
+
+    /// Opens a volume by the name that the user gave.
+    pub fn open(&self, input: &str) -> Result<Volume> {
+        open(&self.source(input)?, input)
+    }
+}
+
+/// Opens a volume; errors name `input`, also where the library knows of no file.
+pub fn open(source: &VolumeSource, input: &str) -> Result<Volume> {
+    match source.open() {
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| input.to_owned()),
+        other => Ok(other?),
+    }
+}
+
+/// An analytic shape or a mesh file.
+pub fn shape(name: &str) -> Result<Shape> {
+    if name.to_lowercase().ends_with(".obj") {
+        let mesh = cao_formats::obj::load(Path::new(name))?.outward()?;
+        return Ok(Shape::Mesh(Arc::new(mesh)));
+    }
+    Shape::parse(name).map_err(|error| usage(error.to_string()))
+}
+
+/// The settings that the flags ask for; the paper's where they say nothing.
+pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) -> Result<Setup> {
+    let mut setup = Setup::of(method, volume.min_spacing());
+    setup.scope = if all { Scope::All } else { Scope::Needed };
+    let occlusion = &mut setup.occlusion;
+    occlusion.rays = settings.rays.unwrap_or(occlusion.rays);
+    occlusion.quadrature = settings.quadrature.unwrap_or(occlusion.quadrature);
+    occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
+    occlusion.offset_mm = settings.offset_mm;
+    occlusion.step_mm = settings.step_mm;
+    occlusion.check(volume.min_spacing())?;
+    Ok(setup)
+}
+
+pub fn three<T: FromStr>(text: &str, separators: &[char]) -> Option<[T; 3]> {
+    let parts: Option<Vec<T>> = text.split(separators).map(|part| part.trim().parse().ok()).collect();
+    parts?.try_into().ok()
+}
+
+pub fn triple<T: FromStr>(text: &str) -> Result<[T; 3], String> {
+    three(text, &[',']).ok_or_else(|| "expected three numbers, X,Y,Z".into())
+}
+
+fn dims(text: &str) -> Result<[usize; 3], String> {
+    three(text, &[',', 'x']).ok_or_else(|| "expected three whole numbers, X,Y,Z".into())
+}
+
+fn endian(text: &str) -> Result<Endian, String> {
+    Endian::parse(text).ok_or_else(|| "expected little or big".into())
+}
+
+pub fn number(text: &str, expected: impl Display, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
+    let number = text.parse().ok().filter(|n: &f32| n.is_finite() && fits(*n));
+    number.ok_or_else(|| format!("expected {expected}"))
+}
+
+pub fn length(text: &str) -> Result<f32, String> {
+    number(text, "a length >= 0 mm", |mm| mm >= 0.0)
+}
+
+pub fn positive(text: &str) -> Result<f32, String> {
+    number(text, "a length > 0 mm", |mm| mm > 0.0)
+}
+
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    let limit = 1..=cao_formats::scene::MAX_IMAGE;
+    match text.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
+        Some((Ok(w), Ok(h))) if limit.contains(&w) && limit.contains(&h) => Ok([w, h]),
+        _ => Err(format!("expected WIDTHxHEIGHT, each 1 … {}", cao_formats::scene::MAX_IMAGE)),
+    }
+}

@@ -1,0 +1,389 @@
+//! Flags and their meaning, one place for all commands. Those that the programs share are in `common`.
+
+use anyhow::{Context, Result};
+pub use cao_cli::args::{Global, Raw, Settings, open, setup, shape, usage};
+use cao_cli::args::{length, number, positive, size, three, triple};
+use cao_measure::stability::Sweep;
+use cao_model::clip::{Clip, Mode, Pose};
+use cao_model::methods::Method;
+use clap::{ArgMatches, Args, Parser, Subcommand};
+use glam::Vec3;
+use std::path::PathBuf;
+
+/// Volumes with ambient occlusion, for both eyes, exact under clipping.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true, after_help = EXAMPLES)]
+pub struct Cli {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cao render builtin:engine:128 -o stereo.png
+  cao render scene.toml --eyes left.png,right.png
+  cao occlusion head.nii.gz --transfer ct-bone --rays 26w -o ao.nrrd
+  cao verify builtin:fruit:64 --poses 10 --seed 7
+  cao info head.nrrd
+More in `cao render --help` and so on.
+
+Volumes: NRRD, NIfTI, MetaImage, raw values with --dims and --type, and
+built-in ones, named like files: builtin:NAME:SIZE, with NAME one of
+engine, fruit, skeleton, empty, uniform, half-space, voxel, sheets.
+Lengths are millimetres, angles degrees, axes those of the volume,
+with the origin at its centre.
+
+Exit codes: 0 done, 1 failed (verify: something differs), 2 wrong usage.";
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Draw a scene or a volume for both eyes
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(Render),
+    /// Write a volume's ambient occlusion as a volume: 0 fully occluded, 1 unobstructed
+    #[command(after_help = OCCLUSION_EXAMPLES)]
+    Occlusion(Occlusion),
+    /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
+    #[command(after_help = VERIFY_EXAMPLES)]
+    Verify(Verify),
+    /// Chart time against error for every method after every kind of change, on this device
+    #[command(after_help = CHART_EXAMPLES)]
+    Chart(Chart),
+    /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
+    #[command(after_help = STABILITY_EXAMPLES)]
+    Stability(Stability),
+    /// Show a volume's header, value range and histogram
+    Info(Info),
+    /// List the Vulkan devices
+    Devices,
+}
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  cao render builtin:engine:128 -o stereo.png \\
+      --clip sphere --clip-scale 40 --clip-translate 38,-38,38
+  cao render head.nrrd --transfer ct-bone -o stereo.png \\
+      --clip box --clip-mode keep --clip-scale 60,80,90
+  cao render head.nrrd --transfer ct-bone --budget-ms 20 -o stereo.png
+  cao render head.nrrd --eyes left.png,right.png \\
+      --clip tool.obj --clip plane --clip-rotate 0,90,0";
+
+const OCCLUSION_EXAMPLES: &str = "\
+Examples:
+  cao occlusion head.nrrd --transfer ct-bone -o ao.nrrd
+  cao occlusion ct.raw --dims 512,512,110 --type int16 --spacing 0.7,0.7,1.5 \\
+      --rays 50w --quadrature segment -o ao.nrrd
+  cao occlusion head.nrrd --transfer ct-bone --budget-error 0.01 -o ao.nrrd
+  cao occlusion builtin:engine:64 --method cao --clip torus --clip-scale 20 \\
+      -o ao.nrrd --mask-out vm.nrrd";
+
+const VERIFY_EXAMPLES: &str = "\
+Examples:
+  cao verify                       all built-in scenes
+  cao verify builtin:skeleton:64 --poses 20 --seed 3
+  cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
+
+Exit code 1 if any voxel or any point that both eyes see differs.";
+
+const CHART_EXAMPLES: &str = "\
+Examples:
+  cao chart -o chart                      three built-in scenes, some ten minutes
+                                          without a GPU
+  cao chart --quick -o chart              a first look, two minutes
+  cao chart head.nrrd --transfer ct-bone --radius-mm 20 -o chart
+  cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
+
+Writes report.html, which stands alone, chart.svg, chart.png and runs.csv, every
+run of every method. A scene without clips gets a ball.";
+
+const STABILITY_EXAMPLES: &str = "\
+Examples:
+  cao stability -o stability            all sweeps; open stability/index.html
+  cao stability -o out --quick --only stereo,views
+  cao stability --list
+
+Exit code 1 if ours fails where it claims to hold, or the method that a sweep
+is there to catch does not.";
+
+/// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
+#[derive(Args)]
+#[command(next_help_heading = "Clips (every --clip-… belongs to the last --clip before it)")]
+pub struct Clips {
+    /// Clip with plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; up to 8 times
+    #[arg(long, value_name = "SHAPE|MESH.obj")]
+    pub clip: Vec<String>,
+    /// What disappears. remove: the inside; keep: the outside [default: remove]
+    #[arg(long, value_name = "remove|keep", value_parser = |s: &str| Mode::parse(s))]
+    pub clip_mode: Vec<Mode>,
+    /// Move by mm from the volume's centre
+    #[arg(long, value_name = "X,Y,Z", value_parser = translation, allow_hyphen_values = true)]
+    pub clip_translate: Vec<[f32; 3]>,
+    /// Turn by degrees about x, then y, then z
+    #[arg(long, value_name = "RX,RY,RZ", value_parser = rotation, allow_hyphen_values = true)]
+    pub clip_rotate: Vec<[f32; 3]>,
+    /// Scale the shape, whose radius or half-edge is 1 mm; a mesh has the file's size in mm
+    #[arg(long, value_name = "S|SX,SY,SZ", value_parser = scale, allow_hyphen_values = true)]
+    pub clip_scale: Vec<[f32; 3]>,
+}
+
+/// Settings chosen by what they cost in the scene at hand.
+#[derive(Args)]
+#[command(next_help_heading = "Occlusion")]
+pub struct Budget {
+    /// Choose the cheapest settings whose error stays below E (root mean square, 0 to 1, against converged occlusion), measured on samples
+    /// of this scene; --method, --rays and --quadrature limit the choice
+    #[arg(long, value_name = "E", value_parser = budget, conflicts_with = "budget_ms")]
+    pub budget_error: Option<f64>,
+    /// Choose the most accurate settings that compute all occlusion in T ms on this device
+    #[arg(long, value_name = "T", value_parser = budget)]
+    pub budget_ms: Option<f64>,
+}
+
+fn budget(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|b: &f64| b.is_finite() && *b > 0.0)
+        .ok_or_else(|| "expected a number > 0".into())
+}
+
+#[derive(Args)]
+pub struct Render {
+    /// Scene file (.toml), volume file, or builtin:NAME:SIZE
+    pub input: String,
+    /// Picture of both eyes side by side (PNG)
+    #[arg(short, long, value_name = "FILE", required_unless_present = "eyes")]
+    pub output: Option<PathBuf>,
+    /// One picture for each eye (PNG); instead of -o or beside it
+    #[arg(long, value_name = "LEFT,RIGHT", value_parser = pair)]
+    pub eyes: Option<[PathBuf; 2]>,
+    /// Pixels of one eye [default: 1024x1024]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Look from this side: degrees about +z, from -y [default: 30]
+    #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
+    pub azimuth: Option<f32>,
+    /// Look from this height: -90 to 90 degrees above the xy plane [default: 25]
+    #[arg(long, value_name = "DEG", value_parser = elevation, allow_hyphen_values = true)]
+    pub elevation: Option<f32>,
+    /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
+    #[arg(long, value_name = "MM", value_parser = distance, allow_hyphen_values = true)]
+    pub distance: Option<f32>,
+    /// Distance between the eyes in mm [default: 1/15 of that distance, at most 63]
+    #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
+    pub ipd: Option<f32>,
+    /// Draw without ambient occlusion
+    #[arg(long, conflicts_with_all = ["budget_error", "budget_ms"])]
+    pub solid: bool,
+    #[command(flatten)]
+    pub settings: Settings,
+    #[command(flatten)]
+    pub budget: Budget,
+    /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
+    /// comparison [default: sweep; cao where --quadrature is left or cell]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    pub method: Option<Method>,
+    #[command(flatten)]
+    pub clips: Clips,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Occlusion {
+    /// Volume file or builtin:NAME:SIZE
+    pub input: String,
+    /// Ambient volume (NRRD of f32, x fastest, the input's spacing)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Also write the clipped opacity (NRRD of f32)
+    #[arg(long, value_name = "FILE")]
+    pub opacity_out: Option<PathBuf>,
+    /// Also write the mask (NRRD of f32): 0 clipped away, 0.5 near a clip, recomputed, 1 untouched
+    #[arg(long, value_name = "FILE")]
+    pub mask_out: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: Settings,
+    #[command(flatten)]
+    pub budget: Budget,
+    /// lao: every ray of every voxel; cao: first without clips, then only what the clips change; sweep: whole lines of voxels at once,
+    /// many times faster [default: lao]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    pub method: Option<Method>,
+    /// Compute only voxels that a sample with opacity can touch; the others hold 1
+    #[arg(long, help_heading = "Occlusion")]
+    pub needed_only: bool,
+    #[command(flatten)]
+    pub clips: Clips,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Verify {
+    /// Volume file, builtin:NAME:SIZE, or built-in for all built-in scenes
+    #[arg(default_value = "built-in")]
+    pub input: String,
+    /// Random poses of every shape
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub poses: u32,
+    /// Seed of the poses
+    #[arg(long, value_name = "S", default_value_t = 1, allow_hyphen_values = true)]
+    pub seed: u64,
+    /// Shapes to clip with, meshes too [default: plane,box,sphere,cylinder,cone,torus]
+    #[arg(long, value_name = "SHAPE,...", value_delimiter = ',')]
+    pub shapes: Vec<String>,
+    /// Compare every voxel, not only those that a sample with opacity can touch
+    #[arg(long)]
+    pub all_voxels: bool,
+    #[command(flatten)]
+    pub settings: Settings,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Chart {
+    /// Scene files (.toml), volume files, or builtin:NAME:SIZE [default: engine, fruit, skeleton]
+    pub scenes: Vec<String>,
+    /// Folder for report, chart and numbers; made where there is none
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Fewer settings, smaller built-in scenes, a coarser reference
+    #[arg(long)]
+    pub quick: bool,
+    /// A peers.json of tools/peers, for a table of other systems in the report
+    #[arg(long, value_name = "FILE")]
+    pub peers: Option<PathBuf>,
+    /// Timed runs of every method and change
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub runs: u32,
+    /// Opacity and colour of values, as in `cao render` [default: the scene's, auto for volumes]
+    #[arg(long, value_name = "FILE|PRESET")]
+    pub transfer: Option<String>,
+    /// Length of the rays in mm [default: the scene's; 8 voxels for the default scenes, else 20]
+    #[arg(long, value_name = "R", value_parser = positive, allow_hyphen_values = true)]
+    pub radius_mm: Option<f32>,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+#[derive(Args)]
+pub struct Stability {
+    /// Folder for index.html, and for each sweep its data (CSV) and charts (SVG, PNG); made where missing
+    #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Only these sweeps, as --list names them
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Sweep::parse(s))]
+    pub only: Vec<Sweep>,
+    /// Fewer and coarser steps: under a minute instead of some minutes
+    #[arg(long)]
+    pub quick: bool,
+    /// Name the sweeps, and do nothing else
+    #[arg(long)]
+    pub list: bool,
+}
+
+#[derive(Args)]
+pub struct Info {
+    /// Volume file or builtin:NAME:SIZE
+    pub input: String,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+/// The clips in the order given: each --clip-* belongs to the last --clip before it.
+pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
+    let places = |id: &str| matches.indices_of(id).into_iter().flatten().collect::<Vec<_>>();
+    let starts = places("clip");
+    if starts.len() > Clip::MAX {
+        return Err(usage(format!("--clip is given {} times; expected at most {}", starts.len(), Clip::MAX)));
+    }
+    // For each value of a flag the number of the clip that it belongs to.
+    let owners = |id: &str| -> Result<Vec<usize>> {
+        let flag = id.replace('_', "-");
+        let mut owners = Vec::new();
+        for place in places(id) {
+            let Some(clip) = starts.iter().rposition(|&start| start < place) else {
+                return Err(usage(format!("--{flag} stands before any --clip; give the shape first")));
+            };
+            if owners.last() == Some(&clip) {
+                return Err(usage(format!("--{flag} is given twice for the same --clip; expected once")));
+            }
+            owners.push(clip);
+        }
+        Ok(owners)
+    };
+    // Mistakes in the order of flags are found before a mesh is read.
+    let modes = owners("clip_mode")?;
+    let translations = owners("clip_translate")?;
+    let rotations = owners("clip_rotate")?;
+    let scales = owners("clip_scale")?;
+
+    let mut clips = Vec::new();
+    for name in values::<String>(matches, "clip") {
+        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {name}"))?));
+    }
+    for (clip, mode) in modes.into_iter().zip(values(matches, "clip_mode")) {
+        clips[clip].mode = mode;
+    }
+    let vectors = |id| values::<[f32; 3]>(matches, id).into_iter().map(Vec3::from_array);
+    for (clip, mm) in translations.into_iter().zip(vectors("clip_translate")) {
+        clips[clip].pose.translate_mm = mm;
+    }
+    for (clip, degrees) in rotations.into_iter().zip(vectors("clip_rotate")) {
+        clips[clip].pose.rotate_deg = degrees;
+    }
+    for (clip, factors) in scales.into_iter().zip(vectors("clip_scale")) {
+        clips[clip].pose.scale = factors;
+    }
+    Ok(clips)
+}
+
+fn values<T: Clone + Send + Sync + 'static>(matches: &ArgMatches, flag: &str) -> Vec<T> {
+    matches.get_many::<T>(flag).into_iter().flatten().cloned().collect()
+}
+
+/// Refuses what no pose can have.
+fn posed(value: [f32; 3], set: impl Fn(&mut Pose, Vec3)) -> Result<[f32; 3], String> {
+    let mut pose = Pose::default();
+    set(&mut pose, Vec3::from_array(value));
+    pose.check().map(|()| value).map_err(|error| error.to_string())
+}
+
+fn translation(text: &str) -> Result<[f32; 3], String> {
+    posed(triple(text)?, |pose, mm| pose.translate_mm = mm)
+}
+
+fn rotation(text: &str) -> Result<[f32; 3], String> {
+    posed(triple(text)?, |pose, degrees| pose.rotate_deg = degrees)
+}
+
+fn scale(text: &str) -> Result<[f32; 3], String> {
+    let factors = match text.parse::<f32>() {
+        Ok(factor) => [factor; 3],
+        Err(_) => three(text, &[',']).ok_or("expected one number or three, SX,SY,SZ")?,
+    };
+    posed(factors, |pose, factors| pose.scale = factors)
+}
+
+/// A head nearer to the volume's centre than this has no direction to look in.
+fn distance(text: &str) -> Result<f32, String> {
+    number(text, "a length > 0 mm, at least 0.001", |mm| mm >= 1e-3)
+}
+
+fn angle(text: &str) -> Result<f32, String> {
+    number(text, "an angle in degrees", |_| true)
+}
+
+fn elevation(text: &str) -> Result<f32, String> {
+    number(text, "an angle from -90 to 90 degrees", |degrees| degrees.abs() <= 90.0)
+}
+
+fn pair(text: &str) -> Result<[PathBuf; 2], String> {
+    match text.split_once(',') {
+        Some((left, right)) if !left.is_empty() && !right.is_empty() => Ok([left.into(), right.into()]),
+        _ => Err("expected two files, LEFT,RIGHT".into()),
+    }
+}

@@ -1,0 +1,65 @@
+//! `cao occlusion`: the ambient volume of a volume, as a file.
+
+use crate::args::{self, Global, Occlusion, setup};
+use crate::budget;
+use anyhow::Result;
+use cao::renderer::{COLOUR, Renderer};
+use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
+use cao_formats::write_nrrd;
+use cao_model::methods::Method;
+use clap::ArgMatches;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<ExitCode> {
+    let also = [&args.opacity_out, &args.mask_out];
+    let targets: Vec<&Path> =
+        [&args.output].into_iter().chain(also.into_iter().flatten()).map(PathBuf::as_path).collect();
+    let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
+    let inputs =
+        [args.input.as_str(), transfer].into_iter().chain(args.clips.clip.iter().map(String::as_str));
+    check_targets(&targets, "nrrd", inputs.map(Path::new))?;
+    let mut progress = Progress::new();
+    let clips = args::clips(matches)?;
+    progress.stage("reading");
+    let volume = args.raw.open(&args.input)?;
+    let method = args.method.unwrap_or(Method::Lao);
+    let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
+    renderer.set_clips(&clips)?;
+    let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
+    progress.stage("occlusion");
+    let timings = renderer.update(&mut |done| progress.set(done))?;
+    check_validation(&gpu)?;
+
+    progress.stage("writing");
+    write_nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+    if let Some(path) = &args.opacity_out {
+        write_nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
+    }
+    if let Some(path) = &args.mask_out {
+        let mask: Vec<f32> = renderer.read_mask()?.into_iter().map(|m| f32::from(m) / 2.0).collect();
+        write_nrrd(path, &volume, &mask, "mask: 0 clipped, 0.5 affected, 1 untouched")?;
+    }
+    let categories = renderer.categories()?;
+    drop(progress);
+
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    out.volume(&args.input, &volume);
+    out.setup(renderer.setup(), &volume);
+    if let Some(planned) = &planned {
+        planned.print(&mut out);
+    }
+    out.categories(&categories);
+    out.timings(&timings);
+    out.memory(&gpu, &volume);
+    for path in targets {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,93 @@
+//! `cao stability`: the sweeps of where methods fail, as data, charts and one sentence each.
+
+use crate::args::{Global, Stability, usage};
+use anyhow::{Context, Result, bail};
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_formats::write_atomic;
+use cao_measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep, page};
+use serde_json::json;
+use std::path::Path;
+use std::process::ExitCode;
+
+pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
+    let mut out = Out::new(global);
+    if args.list {
+        for sweep in SWEEPS {
+            out.line(format!("{:<12} {}", sweep.name, sweep.title));
+        }
+        out.json(json!({ "sweeps": SWEEPS.map(|s| json!({ "name": s.name, "title": s.title })) }));
+        out.finish()?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let folder = args.output.as_deref().ok_or_else(|| usage("-o DIR is missing: where to write"))?;
+    if folder.exists() && !folder.is_dir() {
+        bail!("cannot write into {}: it is a file, expected a folder or a new name", folder.display());
+    }
+    let sweeps = match args.only.is_empty() {
+        true => SWEEPS.to_vec(),
+        false => args.only.clone(),
+    };
+    let effort = if args.quick { Effort::Quick } else { Effort::Full };
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+
+    let mut progress = Progress::new();
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    out.device(&gpu);
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let mut findings = Vec::new();
+    for sweep in sweeps {
+        progress.stage(sweep.name);
+        let finding = (sweep.run)(&gpu, effort, &mut |done| progress.set(done))?;
+        write(folder, sweep, &finding)?;
+        findings.push((sweep, finding));
+    }
+    drop(progress);
+    check_validation(&gpu)?;
+    let info = gpu.info();
+    let head = format!(
+        "cao {}, cao stability{}, on {} ({})",
+        env!("CARGO_PKG_VERSION"),
+        if args.quick { " --quick" } else { "" },
+        info.name,
+        info.driver
+    );
+    let html = page::html(&head, &findings);
+    let index = folder.join("index.html");
+    write_atomic(&index, |file| file.write_all(html.as_bytes()))?;
+    for (sweep, finding) in &findings {
+        out.line(format!("{:<10} {:<8} {}", sweep.name, finding.ours.name(), finding.sentence));
+        if !finding.control_fails {
+            out.line("           the method that has to fail here did not: this sweep shows nothing");
+        }
+    }
+    let good = |f: &Finding| f.ours != Ours::Fails && f.control_fails;
+    let all_good = findings.iter().all(|(_, finding)| good(finding));
+    out.json(json!({
+        "good": all_good,
+        "sweeps": findings.iter().map(|(sweep, f)| json!({
+            "name": sweep.name,
+            "title": sweep.title,
+            "ours": f.ours.name(),
+            "control_fails": f.control_fails,
+            "sentence": f.sentence,
+            "setting": f.setting,
+        })).collect::<Vec<_>>(),
+    }));
+    out.wrote(&index);
+    out.finish()?;
+    Ok(if all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn write(folder: &Path, sweep: Sweep, finding: &Finding) -> Result<()> {
+    let put = |name: String, bytes: &[u8]| write_atomic(&folder.join(name), |file| file.write_all(bytes));
+    put(format!("{}.csv", sweep.name), page::csv(finding).as_bytes())?;
+    for (n, chart) in finding.charts.iter().enumerate() {
+        let drawing = page::draw(chart, &finding.setting);
+        put(format!("{}-{}.svg", sweep.name, n + 1), drawing.svg().as_bytes())?;
+        put(format!("{}-{}.png", sweep.name, n + 1), &drawing.png()?)?;
+    }
+    Ok(())
+}

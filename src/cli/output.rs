@@ -1,0 +1,282 @@
+//! What the program prints: text for people, one JSON object for machines, progress on a terminal only.
+
+use super::args::{Global, usage};
+use anyhow::{Context, Result, bail};
+use cao::renderer::Categories;
+use cao_gpu::{Gpu, OpenOptions};
+use cao_model::lattice::LatticeRays;
+use cao_model::methods::Method;
+use cao_model::settings::Setup;
+use cao_model::volume::Volume;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::{Map, Value, json};
+use std::fs::OpenOptions as FileOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Gathers the answer and prints it once.
+pub struct Out {
+    as_json: bool,
+    text: String,
+    fields: Map<String, Value>,
+}
+
+impl Out {
+    pub fn new(global: &Global) -> Self {
+        Self { as_json: global.json, text: String::new(), fields: Map::new() }
+    }
+
+    /// A line for people.
+    pub fn line(&mut self, line: impl AsRef<str>) {
+        self.text.push_str(line.as_ref());
+        self.text.push('\n');
+    }
+
+    /// All lines so far.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Fields for machines.
+    pub fn json(&mut self, fields: Value) {
+        if let Value::Object(fields) = fields {
+            self.fields.extend(fields);
+        }
+    }
+
+    /// The device that did the work.
+    pub fn device(&mut self, gpu: &Gpu) {
+        let info = gpu.info();
+        self.line(format!("device    {} ({})", info.name, info.driver));
+        self.json(json!({ "device": info.name, "driver": info.driver }));
+    }
+
+    /// A volume's header.
+    pub fn volume(&mut self, name: &str, volume: &Volume) {
+        let ([x, y, z], [sx, sy, sz]) = (volume.dims, volume.spacing);
+        self.line(format!(
+            "volume    {name}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
+            volume.values.kind()
+        ));
+        self.json(json!({
+            "volume": name, "dims": volume.dims, "spacing_mm": volume.spacing, "type": volume.values.kind()
+        }));
+    }
+
+    /// How occlusion was computed.
+    pub fn setup(&mut self, setup: &Setup, volume: &Volume) {
+        let method = setup.method.name();
+        self.json(json!({ "method": method }));
+        self.occlusion(method, setup, volume);
+    }
+
+    /// The rays that these methods cast.
+    pub fn occlusion(&mut self, methods: &str, setup: &Setup, volume: &Volume) {
+        let o = setup.occlusion;
+        let spacing = volume.min_spacing();
+        if setup.method == Method::Sweep {
+            let rays = LatticeRays::new(o.rays, volume.spacing);
+            self.line(format!(
+                "method    {methods}, rays {} ({} directions, residual {:.1e}), quadrature segment, radius {} mm, from {} mm on, samples at most {} mm apart",
+                o.rays.name(),
+                rays.rays.len(),
+                rays.residual,
+                o.radius_mm,
+                o.lattice_offset(spacing),
+                o.lattice_step(spacing)
+            ));
+            self.json(json!({
+                "rays": o.rays.name(), "directions": rays.rays.len(), "residual": rays.residual,
+                "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
+                "offset_mm": o.lattice_offset(spacing), "step_mm": o.lattice_step(spacing)
+            }));
+            return;
+        }
+        self.line(format!(
+            "method    {methods}, rays {}, quadrature {}, radius {} mm in {} steps of {} mm, first sample at {} mm",
+            o.rays.name(),
+            o.quadrature.name(),
+            o.radius_mm,
+            o.samples(spacing),
+            o.step(spacing),
+            o.first(spacing)
+        ));
+        self.json(json!({
+            "rays": o.rays.name(), "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
+            "samples": o.samples(spacing), "step_mm": o.step(spacing), "first_sample_mm": o.first(spacing)
+        }));
+    }
+
+    /// Size of the picture.
+    pub fn image(&mut self, [width, height]: [u32; 2]) {
+        self.line(format!("image     {width} x {height} pixels for each eye"));
+        self.json(json!({ "image_size": [width, height] }));
+    }
+
+    /// Voxels of each category.
+    pub fn categories(&mut self, c: &Categories) {
+        let all = f64::from(c.clipped) + f64::from(c.affected) + f64::from(c.untouched);
+        let share = |n: u32| 100.0 * f64::from(n) / all.max(1.0);
+        self.line(format!(
+            "voxels    {:.2} % clipped, {:.2} % affected, {:.2} % untouched",
+            share(c.clipped),
+            share(c.affected),
+            share(c.untouched)
+        ));
+        self.json(json!({ "clipped": c.clipped, "affected": c.affected, "untouched": c.untouched }));
+    }
+
+    /// Device memory at its peak.
+    pub fn memory(&mut self, gpu: &Gpu, volume: &Volume) {
+        let peak = gpu.memory_peak();
+        let per_voxel = peak as f64 / volume.len() as f64;
+        self.line(format!(
+            "memory    {:.1} MiB at peak, {per_voxel:.1} bytes a voxel",
+            peak as f64 / 1048576.0
+        ));
+        self.json(json!({ "memory_peak_bytes": peak, "memory_bytes_per_voxel": per_voxel }));
+    }
+
+    /// A file that was written.
+    pub fn wrote(&mut self, path: &Path) {
+        self.line(format!("wrote     {}", path.display()));
+        let files = self.fields.entry("files").or_insert_with(|| json!([]));
+        if let Value::Array(files) = files {
+            files.push(path.display().to_string().into());
+        }
+    }
+
+    /// Times of the stages, in both forms.
+    pub fn timings(&mut self, timings: &[(String, f64)]) {
+        let mut stages = Map::new();
+        for (stage, ms) in timings {
+            self.line(format!("  {stage:<20} {ms:>10.3} ms"));
+            stages.insert(stage.clone(), (*ms).into());
+        }
+        self.json(json!({ "stages_ms": stages }));
+    }
+
+    /// Prints. A pipe whose reader has left is no failure.
+    pub fn finish(self) -> Result<()> {
+        let text = if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
+        match std::io::stdout().write_all(text.as_bytes()) {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            other => other.context("cannot write to standard output"),
+        }
+    }
+}
+
+/// Opens the device that the user chose.
+pub fn open_gpu(global: &Global) -> Result<Gpu> {
+    Ok(Gpu::open(&OpenOptions { device: global.device.clone(), validation: global.validate })?)
+}
+
+/// Fails when the validation layer said anything.
+pub fn check_validation(gpu: &Gpu) -> Result<()> {
+    Ok(gpu.assert_clean()?)
+}
+
+/// Refuses files that could not be written in the end, or that would replace an input or one another, before anything
+/// long begins.
+pub fn check_targets<'a>(
+    targets: &[&Path],
+    extension: &str,
+    inputs: impl Iterator<Item = &'a Path>,
+) -> Result<()> {
+    let inputs: Vec<PathBuf> = inputs.filter_map(|input| input.canonicalize().ok()).collect();
+    let mut taken = Vec::new();
+    for target in targets {
+        let shown = target.display();
+        let Some(name) = target.file_name() else {
+            return Err(usage(format!("{shown}: expected the name of a file to write")));
+        };
+        if target.extension().is_some_and(|found| !found.eq_ignore_ascii_case(extension)) {
+            return Err(usage(format!(
+                "{shown}: expected a name that ends in .{extension}, the format written"
+            )));
+        }
+        let folder = match target.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let Ok(real_folder) = folder.canonicalize() else {
+            bail!("cannot write {shown}: there is no folder {}", folder.display());
+        };
+        if target.is_dir() {
+            bail!("cannot write {shown}: it is a folder, expected the name of a file");
+        }
+        let real = target.canonicalize().unwrap_or_else(|_| real_folder.join(name));
+        if inputs.contains(&real) {
+            return Err(usage(format!("{shown}: would replace an input; expected another name")));
+        }
+        if taken.contains(&real) {
+            return Err(usage(format!("{shown}: would be written twice; expected different names")));
+        }
+        // Permissions, read-only file systems and quotas are found by trying only.
+        let trial = real_folder.join(format!(".cao-{}.part", std::process::id()));
+        let tried = FileOptions::new().write(true).create_new(true).open(&trial);
+        tried.with_context(|| format!("cannot write {shown}"))?;
+        std::fs::remove_file(&trial).with_context(|| format!("cannot write {shown}"))?;
+        taken.push(real);
+    }
+    Ok(())
+}
+
+/// What goes on, on a terminal, where a stage takes longer than a second; nothing in a pipe.
+pub struct Progress {
+    bar: ProgressBar,
+    /// Tells the thread that waits for the second to pass that the stage is over.
+    stage: Option<mpsc::Sender<()>>,
+}
+
+impl Progress {
+    pub fn new() -> Self {
+        Self { bar: ProgressBar::hidden(), stage: None }
+    }
+
+    /// Begins a stage.
+    pub fn stage(&mut self, what: &'static str) {
+        self.end_stage();
+        let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}");
+        self.bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
+        self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        self.bar.set_message(what);
+        let (sender, ended) = mpsc::channel();
+        self.stage = Some(sender);
+        let bar = self.bar.clone();
+        std::thread::spawn(move || {
+            if ended.recv_timeout(Duration::from_secs(1)) == Err(mpsc::RecvTimeoutError::Timeout) {
+                // Stays hidden where standard error is no terminal.
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.enable_steady_tick(Duration::from_millis(100));
+            }
+        });
+    }
+
+    /// What goes on in the stage just now.
+    pub fn say(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
+    /// Share of the stage that is done, 0 … 1.
+    pub fn set(&mut self, done: f64) {
+        if self.bar.position() == 0 {
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %  {eta} left");
+            self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        }
+        self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
+    }
+
+    fn end_stage(&mut self) {
+        self.stage = None;
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.end_stage();
+    }
+}

@@ -1,0 +1,95 @@
+//! Flags and their meaning.
+
+use super::method::Method;
+use super::scale::Series;
+use cao_cli::args::{Global, Raw, Settings, size};
+use clap::Parser;
+use std::path::PathBuf;
+
+/// Times frames for one, two or four views while head and clip move, method by method.
+#[derive(Parser)]
+#[command(name = "stereo-bench", version, after_help = EXAMPLES)]
+pub struct Cli {
+    /// Volume file or builtin:NAME:SIZE
+    #[arg(default_value = "builtin:engine:128")]
+    pub input: String,
+    /// Methods, which take turns frame by frame. solid: no occlusion; lao: computed anew in every frame; cao: what the clip changed;
+    /// cao-literal: the paper's recipe to the letter; sweep: line sweeps by the rule `segment`, what the clip changed
+    #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Method::parse, default_values_t = Method::ALL)]
+    pub methods: Vec<Method>,
+    /// Pixels of one view
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "512x512")]
+    pub size: [u32; 2],
+    /// Views drawn at once: 1, 2 (left and right), 4 (and an inset for each)
+    #[arg(long, value_name = "N", value_parser = views, default_value = "2")]
+    pub views: usize,
+    /// Frames of one run that count; the path closes after 90 [default: 90, on a software driver 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: Option<u32>,
+    /// Runs, along the same path; the spread of their medians says how far to trust the numbers
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), default_value_t = 3)]
+    pub runs: u32,
+    /// Frames before each run that do not count
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000), default_value_t = 3)]
+    pub warm_up: u32,
+    /// Shape that moves through the volume: plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; none for no clip
+    #[arg(long, value_name = "SHAPE|MESH.obj", default_value = "sphere")]
+    pub clip: String,
+    /// Compute every voxel, not only those that a sample with opacity can touch
+    #[arg(long)]
+    pub all_voxels: bool,
+    /// Also vary one setting at a time: size (of a built-in volume), rays, radius, resolution, views
+    #[arg(long, value_name = "SETTING,...", value_delimiter = ',', value_parser = Series::parse)]
+    pub scale: Vec<Series>,
+    /// Write every frame as a line of comma-separated values
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Keep the run in FOLDER/DATE-DEVICE: raw.csv, summary, README.md with command, versions and hardware
+    /// [default of FOLDER: benches/runs]
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "benches/runs")]
+    pub save: Option<PathBuf>,
+    /// Measure what the project holds itself to and exit with 1 where a bar is missed; every other setting is the bar's own
+    #[arg(long)]
+    pub bars: bool,
+    /// Folder with volumes/engine_256x256x128_uint8.nrrd and volumes/torso_s0024_287x287x486_uint8.nrrd, for the bars on real
+    /// volumes
+    #[arg(long, value_name = "DIR", requires = "bars")]
+    pub data: Option<PathBuf>,
+    #[command(flatten)]
+    pub settings: Settings,
+    #[command(flatten)]
+    pub raw: Raw,
+    #[command(flatten)]
+    pub global: Global,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  stereo-bench                                 the built-in engine block, all methods
+  stereo-bench builtin:engine:64 --size 128x128 --frames 30 --runs 1     in seconds
+  stereo-bench head.nrrd --transfer ct-bone --clip plane --views 4
+  stereo-bench builtin:skeleton:512 --radius-mm 50 --rays 54 --size 2064x2208
+  stereo-bench --methods lao,cao --scale rays,radius,views --csv frames.csv
+  stereo-bench --scale size,rays,radius,resolution,views --save
+  stereo-bench --bars --data DIR               minutes on a software driver
+
+The path: in 90 frames the head goes once round an ellipse of 20 degrees of
+azimuth and 8 of elevation about a place from which the volume fills the
+picture, a tenth nearer and farther on the way. The clip, whose half-size is
+a fifth of the volume's shortest edge, goes once round a loop of nearly half
+the volume and turns once about z. Both depend on the frame's number alone.
+
+What is printed: percentiles are frames that were measured (nearest rank). The
+stages are those of the paper's Fig. 9: clipping (its step 4), spherical ray
+cast (step 5), rendering (step 6), overhead (the rest of the frame's time).
+
+Exit codes: 0 done, 1 failed, 2 wrong usage.";
+
+fn views(text: &str) -> Result<usize, String> {
+    match text {
+        "1" => Ok(1),
+        "2" => Ok(2),
+        "4" => Ok(4),
+        _ => Err("expected 1, 2 or 4".into()),
+    }
+}

@@ -1,0 +1,430 @@
+//! `stereo-bench --bars`: what the project holds itself to, measured in one run, A B A B within one process, and judged.
+//!
+//! The baseline everywhere is `LAO (unit)` (method.md §2): rays by the sampler, a sample a voxel, every voxel. On large volumes it
+//! is timed on a random sample of bricks and scaled by their share of all; sweeps are always timed whole, with everything that an
+//! update does.
+
+use super::args::Cli;
+use super::machine;
+use super::statistics::median;
+use anyhow::{Context, Result};
+use cao::cast::lao::{Bindings, Work};
+use cao::cast::volumes::{Kernels, Settings, Volumes, read_values};
+use cao::field::Field;
+use cao::field::bricks::BrickList;
+use cao::field::opacity::Opacity;
+use cao::field::transfer::TransferBuffer;
+use cao::renderer::{COLOUR, Renderer};
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_gpu::{Access, DeviceKind, Gpu, Timings};
+use cao_measure::error::errors;
+use cao_measure::random::Random;
+use cao_measure::reference::{Plan, ambient};
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::lattice::LatticeRays;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Scope;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::volume::Volume;
+use cao_twin::Grid;
+use glam::Vec3;
+use serde_json::json;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Alternating measurements of each row; medians and ranges of them are printed.
+const RUNS: usize = 5;
+
+/// Voxels that the baseline is timed on at most, times samples a voxel: some seconds on a software driver.
+const BASELINE_SAMPLES: f64 = 1e8;
+
+/// One bar.
+struct Row {
+    place: &'static str,
+    what: &'static str,
+    bar: f64,
+    /// Larger is better; else smaller is.
+    at_least: bool,
+    /// A ratio for each run.
+    ratios: Vec<f64>,
+    /// What else to know.
+    note: String,
+}
+
+impl Row {
+    fn reached(&self) -> bool {
+        let found = median(&self.ratios);
+        if self.at_least { found >= self.bar } else { found <= self.bar }
+    }
+}
+
+/// A volume with the transfer function that the bars are for.
+struct Scene {
+    name: String,
+    volume: Volume,
+    transfer: TransferFunction,
+}
+
+impl Scene {
+    /// Opacity rises from 0 at `threshold` to 0.8 a little above it and on to 0.95.
+    fn new(name: &str, volume: Volume, threshold: f32) -> Result<Self> {
+        let opacity = vec![[threshold, 0.0], [threshold + 20.0, 0.8], [255.0, 0.95]];
+        let transfer = TransferFunction::new(opacity, vec![[0.0, 1.0, 1.0, 1.0]], None)?;
+        Ok(Self { name: name.into(), volume, transfer })
+    }
+
+    fn voxel(&self) -> f32 {
+        self.volume.min_spacing() as f32
+    }
+}
+
+fn setup(scene: &Scene, rays: RaySet, radius_voxels: f32, scope: Scope) -> Setup {
+    let mut setup = Setup::of(cao_model::methods::Method::Cao, scene.volume.min_spacing());
+    setup.method = Method::Sweep;
+    setup.scope = scope;
+    setup.occlusion.rays = rays;
+    setup.occlusion.quadrature = Quadrature::Segment;
+    setup.occlusion.radius_mm = radius_voxels * scene.voxel();
+    setup
+}
+
+fn sum(timings: &Timings) -> f64 {
+    timings.iter().map(|(_, ms)| ms).sum()
+}
+
+/// `LAO (unit)` of a scene without clips on a sample of its bricks.
+struct Baseline {
+    kernels: Kernels,
+    volumes: Volumes,
+    field: Field,
+    settings: Settings,
+    list: BrickList,
+    bricks: u32,
+    /// All bricks / those in the list.
+    scale: f64,
+}
+
+impl Baseline {
+    fn new(gpu: &Gpu, scene: &Scene, rays: RaySet, radius_voxels: f32) -> Result<Self> {
+        let field = Field::upload(gpu, &scene.volume)?;
+        let spacing = scene.volume.min_spacing();
+        let occlusion =
+            Occlusion { rays, radius_mm: radius_voxels * scene.voxel(), ..Occlusion::paper(spacing) };
+        let settings =
+            Settings { occlusion, scope: Scope::All, reference_mm: scene.transfer.reference_mm(spacing) };
+        let (kernels, volumes) = (Kernels::new(gpu)?, Volumes::new(gpu, &field)?);
+        let transfer = TransferBuffer::new(gpu)?;
+        let mut rec = gpu.recorder("baseline")?;
+        kernels.lao.record_rays(&mut rec, &occlusion)?;
+        transfer.record(&mut rec, &scene.transfer)?;
+        Opacity::new(gpu)?.record(&mut rec, &field, &transfer, &volumes.opacity)?;
+        rec.submit_and_wait()?;
+
+        let all = field.brick_count();
+        let samples = rays.directions().len() as f64 * f64::from(radius_voxels) * 512.0;
+        let wanted = ((BASELINE_SAMPLES / samples) as u32).clamp(1, all);
+        let mut random = Random::new(7);
+        let mut bricks: Vec<u32> = (0..all).collect();
+        for i in 0..wanted as usize {
+            bricks.swap(i, i + random.below(u64::from(all) - i as u64) as usize);
+        }
+        bricks.truncate(wanted as usize);
+        let list = BrickList::of(gpu, &bricks)?;
+        let scale = f64::from(all) / f64::from(wanted);
+        Ok(Self { kernels, volumes, field, settings, list, bricks: wanted, scale })
+    }
+
+    /// Time of all bricks in ms, by that of the listed ones.
+    fn measure(&self, gpu: &Gpu) -> Result<f64> {
+        let bindings = Bindings {
+            opacity: &self.volumes.opacity,
+            list: &self.list,
+            mask: &self.volumes.mask,
+            precomputed: &self.volumes.full_opacity,
+            ambient: &self.volumes.ambient,
+        };
+        let Settings { occlusion, scope, reference_mm } = self.settings;
+        let mut rec = gpu.recorder("lao (unit)")?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite]);
+        rec.stage("lao (unit)")?;
+        let (field, count) = (&self.field, self.bricks);
+        self.kernels.lao.record_part(
+            &mut rec,
+            field,
+            &occlusion,
+            reference_mm,
+            scope,
+            Work::Full,
+            bindings,
+            0,
+            count,
+        )?;
+        rec.end_stage()?;
+        Ok(sum(&rec.submit_and_wait()?) * self.scale)
+    }
+
+    fn note(&self) -> String {
+        format!("LAO (unit) on {} of {} bricks", self.bricks, self.field.brick_count())
+    }
+}
+
+/// Time of a whole update by sweeps in ms: nothing is taken as known.
+fn full_update(renderer: &mut Renderer) -> Result<f64> {
+    renderer.invalidate();
+    Ok(sum(&renderer.update(&mut |_| ())?))
+}
+
+fn sweep_against_lao(
+    gpu: &Gpu,
+    scene: &Scene,
+    radius_voxels: f32,
+    scope: Scope,
+    bar: (&'static str, f64),
+) -> Result<Row> {
+    let baseline = Baseline::new(gpu, scene, RaySet::R26, radius_voxels)?;
+    let setup = setup(scene, RaySet::W26, radius_voxels, scope);
+    let mut renderer = Renderer::new(gpu, &scene.volume, scene.transfer.clone(), setup, COLOUR)?;
+    let mut ratios = Vec::new();
+    let mut times = [Vec::new(), Vec::new()];
+    full_update(&mut renderer)?;
+    for _ in 0..RUNS {
+        times[0].push(baseline.measure(gpu)?);
+        times[1].push(full_update(&mut renderer)?);
+        ratios.push(times[0][times[0].len() - 1] / times[1][times[1].len() - 1]);
+    }
+    let note = format!(
+        "{}: {:.0} against {:.1} ms; {}",
+        scene.name,
+        median(&times[0]),
+        median(&times[1]),
+        baseline.note()
+    );
+    Ok(Row {
+        place: bar.0,
+        what: "full update, sweep against LAO (unit)",
+        bar: bar.1,
+        at_least: true,
+        ratios,
+        note,
+    })
+}
+
+/// Error of LAO (unit), 54 rays, over that of the sweep, 50 rays, both against the ambient reference.
+fn error_ratio(gpu: &Gpu, scene: &Scene, radius_voxels: f32, place: &'static str) -> Result<Row> {
+    let grid = Grid { dims: scene.volume.dims, spacing: scene.volume.spacing };
+    let swept = setup(scene, RaySet::W50, radius_voxels, Scope::Needed);
+    let mut renderer = Renderer::new(gpu, &scene.volume, scene.transfer.clone(), swept, COLOUR)?;
+    renderer.update(&mut |_| ())?;
+    let (opacity, found) = (renderer.read_opacity()?, renderer.read_ambient()?);
+    drop(renderer);
+    let plan = Plan { directions: 1000, steps_per_voxel: 8, max_voxels: 3000 };
+    let reference_mm = f64::from(scene.transfer.reference_mm(scene.volume.min_spacing()));
+    let radius_mm = f64::from(radius_voxels * scene.voxel());
+    let offset_mm = 0.5 * scene.volume.min_spacing();
+    let reference = ambient(gpu, &grid, &opacity, radius_mm, offset_mm, reference_mm, &plan, &mut |_| ())?;
+    let sweep = errors(&found, &reference.ambient, &reference.counts);
+
+    // LAO (unit) at the bricks of the same voxels.
+    let baseline = Baseline::new(gpu, scene, RaySet::R54, radius_voxels)?;
+    let [bx, by, _] = baseline.field.bricks();
+    let mut bricks: Vec<u32> = (0..grid.len())
+        .filter(|&i| reference.counts[i])
+        .map(|i| grid.voxel(i).map(|c| c as u32 / 8))
+        .map(|[x, y, z]| (z * by + y) * bx + x)
+        .collect();
+    bricks.sort_unstable();
+    bricks.dedup();
+    let baseline =
+        Baseline { list: BrickList::of(gpu, &bricks)?, bricks: bricks.len() as u32, scale: 1.0, ..baseline };
+    baseline.measure(gpu)?;
+    let lao = read_values(gpu, &baseline.volumes.ambient)?;
+    let lao = errors(&lao, &reference.ambient, &reference.counts);
+    let note = format!(
+        "{}: RMSE {:.5} against {:.5} at {} voxels; the reference's own {:.5}",
+        scene.name, sweep.rmse, lao.rmse, sweep.count, reference.convergence.rmse
+    );
+    Ok(Row {
+        place,
+        what: "error, LAO (unit) 54 rays over 50 rays swept",
+        bar: 3.0,
+        at_least: true,
+        ratios: vec![lao.rmse / sweep.rmse],
+        note,
+    })
+}
+
+/// A sphere of a quarter of the volume's size in a place of its material, moved one voxel or to a new place.
+fn clip_update(gpu: &Gpu, scene: &Scene, moves: [Vec3; 2], place: &'static str, bar: f64) -> Result<Row> {
+    let setup = setup(scene, RaySet::W26, 20.0, Scope::Needed);
+    let mut renderer = Renderer::new(gpu, &scene.volume, scene.transfer.clone(), setup, COLOUR)?;
+    let radius = 0.125 * scene.volume.size_mm().into_iter().fold(0.0, f64::max) as f32;
+    let clip = |place: Vec3| {
+        let pose =
+            Pose { translate_mm: place * scene.voxel(), scale: Vec3::splat(radius), ..Pose::default() };
+        Clip { pose, ..Clip::remove(Shape::Sphere) }
+    };
+    renderer.set_clips(&[clip(moves[0])])?;
+    full_update(&mut renderer)?;
+    let mut times = [Vec::new(), Vec::new()];
+    let mut touched = 0.0;
+    for run in 0..RUNS {
+        times[0].push(full_update(&mut renderer)?);
+        renderer.set_clips(&[clip(moves[(run + 1) % 2])])?;
+        times[1].push(sum(&renderer.update(&mut |_| ())?));
+        touched = f64::from(renderer.categories()?.affected) / scene.volume.len() as f64;
+    }
+    let ratios = times[0].iter().zip(&times[1]).map(|(full, update)| full / update).collect();
+    let note = format!(
+        "{}: {:.1} against {:.1} ms, {:.1} % of all voxels recomputed",
+        scene.name,
+        median(&times[0]),
+        median(&times[1]),
+        100.0 * touched
+    );
+    Ok(Row { place, what: "clip update against full sweep", bar, at_least: true, ratios, note })
+}
+
+/// The device's sweep over the same sweep in plain SIMD code on all cores.
+fn against_simd(gpu: &Gpu, scene: &Scene) -> Result<Row> {
+    let setup = setup(scene, RaySet::W26, 20.0, Scope::All);
+    let mut renderer = Renderer::new(gpu, &scene.volume, scene.transfer.clone(), setup, COLOUR)?;
+    full_update(&mut renderer)?;
+    let q: Vec<f32> = renderer.read_opacity()?.into_iter().map(|a| 1.0 - a).collect();
+    let rays = LatticeRays::new(RaySet::W26, scene.volume.spacing).rays;
+    let spacing = scene.volume.spacing;
+    let directions: Vec<_> = rays.iter().map(|ray| (ray.step, ray.weight)).collect();
+    let of = |v: [i32; 3]| rays.iter().find(|ray| ray.step == v).map_or(rays[0], |ray| *ray);
+    let lines = cao_simd::lines(
+        &directions,
+        |v| of(v).length_mm(spacing) as f32,
+        |v| of(v).segments(spacing, f64::from(setup.occlusion.radius_mm)) as usize,
+    );
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    // lavapipe compiles for 256 bits; so does the code beside it, where the processor can.
+    let all = cao_simd::Vectors::available();
+    let vectors = all.iter().copied().find(|v| *v == cao_simd::Vectors::Avx2).unwrap_or(all[0]);
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..RUNS {
+        let start = Instant::now();
+        std::hint::black_box(cao_simd::sweep(
+            scene.volume.dims,
+            &q,
+            &lines,
+            cao_simd::Rule::Segment,
+            vectors,
+            threads,
+        ));
+        times[0].push(start.elapsed().as_secs_f64() * 1e3);
+        renderer.invalidate();
+        let timings = renderer.update(&mut |_| ())?;
+        times[1].push(timings.iter().filter(|(stage, _)| stage == "sweep").map(|(_, ms)| ms).sum());
+    }
+    let ratios = times[0].iter().zip(&times[1]).map(|(simd, device)| device / simd).collect();
+    let note = format!(
+        "{}: {:.1} against {:.1} ms on {threads} threads, {vectors:?}",
+        scene.name,
+        median(&times[1]),
+        median(&times[0])
+    );
+    Ok(Row {
+        place: "this machine, 26 rays, R = 20",
+        what: "time over that of plain SIMD code",
+        bar: 2.0,
+        at_least: false,
+        ratios,
+        note,
+    })
+}
+
+fn real(folder: &Path, name: &str, threshold: f32) -> Result<Scene> {
+    let path = folder.join("volumes").join(name);
+    let volume =
+        cao_formats::open(&path.to_string_lossy()).with_context(|| format!("--data {}", folder.display()))?;
+    Scene::new(name.split('_').next().unwrap_or(name), volume, threshold)
+}
+
+pub fn run(cli: &Cli) -> Result<ExitCode> {
+    let mut progress = Progress::new();
+    progress.stage("reading");
+    let built_in = Scene::new("builtin:engine:128", cao_formats::open("builtin:engine:128")?, 60.0)?;
+    let data = cli.data.as_deref();
+    let engine = data.map(|folder| real(folder, "engine_256x256x128_uint8.nrrd", 60.0)).transpose()?;
+    let torso = data.map(|folder| real(folder, "torso_s0024_287x287x486_uint8.nrrd", 130.0)).transpose()?;
+    progress.stage("measuring");
+    let gpu = open_gpu(&cli.global)?;
+    let mut rows = Vec::new();
+    let total = if data.is_some() { 8.0 } else { 3.0 };
+    let mut push = |row: Row| {
+        rows.push(row);
+        progress.set(rows.len() as f64 / total);
+    };
+    push(sweep_against_lao(&gpu, &built_in, 20.0, Scope::All, ("128³, R = 20, 26 rays", 12.0))?);
+    push(sweep_against_lao(&gpu, &built_in, 50.0, Scope::All, ("128³, R = 50, 26 rays", 35.0))?);
+    if let (Some(engine), Some(torso)) = (&engine, &torso) {
+        push(sweep_against_lao(
+            &gpu,
+            engine,
+            20.0,
+            Scope::Needed,
+            ("engine, R = 20, 26 rays, needed voxels", 30.0),
+        )?);
+        push(sweep_against_lao(
+            &gpu,
+            torso,
+            50.0,
+            Scope::Needed,
+            ("torso, R = 50, 26 rays, needed voxels", 100.0),
+        )?);
+        push(error_ratio(&gpu, torso, 50.0, "torso, R = 50")?);
+        let from = Vec3::new(20.0, -30.0, 10.0);
+        push(clip_update(&gpu, engine, [from, from + Vec3::X], "engine, R = 20, sphere moved 1 voxel", 5.0)?);
+        let to = Vec3::new(-35.0, 25.0, 0.0);
+        push(clip_update(&gpu, engine, [from, to], "engine, R = 20, sphere at a new place", 3.0)?);
+    }
+    if gpu.info().kind == DeviceKind::Cpu {
+        push(against_simd(&gpu, &built_in)?);
+    }
+    check_validation(&gpu)?;
+    drop(progress);
+
+    let mut out = Out::new(&cli.global);
+    out.device(&gpu);
+    let machine = machine::describe();
+    out.line(format!("machine   {machine}"));
+    out.line(format!("medians of {RUNS} alternating runs in one process, lowest and highest in brackets"));
+    let mut reached = true;
+    for row in &rows {
+        let range = |pick: fn(f64, f64) -> f64| row.ratios.iter().copied().reduce(pick).unwrap_or(f64::NAN);
+        let (low, high) = (range(f64::min), range(f64::max));
+        reached &= row.reached();
+        out.line(format!(
+            "{:<6} {:<42} {:<46} {:>7.2} x [{low:.2} … {high:.2}], bar {} {}",
+            if row.reached() { "ok" } else { "MISSED" },
+            row.place,
+            row.what,
+            median(&row.ratios),
+            if row.at_least { "≥" } else { "≤" },
+            row.bar
+        ));
+        out.line(format!("       {}", row.note));
+    }
+    if data.is_none() {
+        out.line("not measured: the real volumes; give their folder by --data");
+    }
+    if gpu.info().kind == DeviceKind::Cpu {
+        out.line("not measured: the bars of a data-centre GPU; this is a software driver");
+    }
+    out.json(json!({
+        "machine": machine,
+        "reached": reached,
+        "bars": rows.iter().map(|row| json!({
+            "where": row.place, "what": row.what, "bar": row.bar, "at_least": row.at_least,
+            "median": median(&row.ratios), "ratios": row.ratios, "reached": row.reached(), "note": row.note,
+        })).collect::<Vec<_>>(),
+    }));
+    out.finish()?;
+    Ok(if reached { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

@@ -1,0 +1,224 @@
+//! The frames of some configurations: every method of each in turn, along the path, timed.
+
+use super::method::Method;
+use super::path;
+use anyhow::{Context, Result};
+use cao::renderer::{COLOUR, Categories, Renderer};
+use cao_gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_model::clip::Shape;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::volume::Volume;
+use std::rc::Rc;
+use std::time::Instant;
+
+/// A volume and how it is drawn.
+pub struct Input {
+    /// What the user calls it.
+    pub name: String,
+    pub volume: Volume,
+    pub transfer: TransferFunction,
+}
+
+/// Everything that may be varied.
+#[derive(Clone)]
+pub struct Configuration {
+    pub input: Rc<Input>,
+    /// What all methods share.
+    pub setup: Setup,
+    /// Pixels of one view.
+    pub size: [u32; 2],
+    pub views: usize,
+}
+
+/// What is done in every configuration.
+pub struct Plan {
+    pub methods: Vec<Method>,
+    /// What moves through the volume.
+    pub clip: Option<Shape>,
+    pub frames: u32,
+    pub runs: u32,
+    pub warm_up: u32,
+}
+
+impl Plan {
+    /// Frames that all methods draw together in one configuration, counted or not.
+    pub fn total(&self) -> u64 {
+        u64::from(self.runs) * u64::from(self.warm_up + self.frames) * self.methods.len() as u64
+    }
+}
+
+/// One frame. Times in ms.
+pub struct Frame {
+    /// From moving the clip to the end of the device's work.
+    pub wall: f64,
+    /// GPU timestamps; empty where the device has none.
+    pub stages: Timings,
+    /// What the clip did to the voxels.
+    pub categories: Categories,
+}
+
+/// The parts of a frame as the paper names them (CAO Fig. 9).
+pub const PARTS: [&str; 4] = ["clipping", "spherical ray cast", "rendering", "overhead"];
+
+impl Frame {
+    /// Times of the [`PARTS`] in ms. What is neither clipping nor for the drawing brings the ambient volume up to date; what no stage
+    /// accounts for is overhead: recording, submission, waiting.
+    pub fn parts(&self) -> [f64; 4] {
+        let mut parts = [0.0; 4];
+        for (stage, ms) in &self.stages {
+            parts[match stage.as_str() {
+                "classify" | "carve" => 0,
+                // Which bricks rays leap over changes with the clips too.
+                "occupancy" | "distances" | "raycast" => 2,
+                _ => 1,
+            }] += ms;
+        }
+        parts[3] = (self.wall - parts.iter().sum::<f64>()).max(0.0);
+        parts
+    }
+}
+
+/// A method's frames.
+pub struct Measured {
+    pub method: Method,
+    /// In each run the frames that count, in order.
+    pub runs: Vec<Vec<Frame>>,
+}
+
+impl Measured {
+    /// The counted frames of all runs.
+    pub fn frames(&self) -> impl Iterator<Item = &Frame> {
+        self.runs.iter().flatten()
+    }
+}
+
+/// A method's renderer in one configuration.
+struct Subject<'a> {
+    configuration: &'a Configuration,
+    target: Rc<Target>,
+    renderer: Renderer,
+    measured: Measured,
+}
+
+/// The images that all methods of a configuration draw to.
+struct Target {
+    colour: Image,
+    depth: Image,
+}
+
+impl Target {
+    fn new(gpu: &Gpu, configuration: &Configuration) -> Result<Self> {
+        let image = |name, format| {
+            let [width, height] = configuration.size;
+            let layers = configuration.views as u32;
+            let usage = ImageUse::ATTACHMENT;
+            let kind = ImageKind::D2;
+            gpu.image(name, &ImageDesc { dims: [width, height, 1], layers, format, kind, usage })
+        };
+        let target = Self { colour: image("colour", COLOUR)?, depth: image("depth", Format::D32Float)? };
+        let mut rec = gpu.recorder("images")?;
+        rec.discard(&target.colour);
+        rec.discard(&target.depth);
+        rec.barrier(&[], &[Access::AttachmentWrite]);
+        rec.submit_and_wait()?;
+        Ok(target)
+    }
+}
+
+/// Draws the path with all methods of all configurations in turn, frame by frame, so that all can be compared with one another.
+/// `progress` hears of every frame drawn. The results are in the order of the configurations, and within each in that of the methods.
+pub fn measure(
+    gpu: &Gpu,
+    configurations: &[Configuration],
+    plan: &Plan,
+    progress: &mut dyn FnMut(),
+) -> Result<Vec<Vec<Measured>>> {
+    let mut subjects = Vec::new();
+    for configuration in configurations {
+        let Configuration { size: [width, height], views, .. } = configuration;
+        let target = Target::new(gpu, configuration)
+            .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
+        let target = Rc::new(target);
+        for &method in &plan.methods {
+            let subject = Subject::new(gpu, configuration, &target, plan, method);
+            subjects.push(subject.with_context(|| method.name())?);
+        }
+    }
+    for _ in 0..plan.runs {
+        subjects.iter_mut().for_each(|subject| subject.measured.runs.push(Vec::new()));
+        for frame in -i64::from(plan.warm_up)..i64::from(plan.frames) {
+            for subject in &mut subjects {
+                let drawn = subject.draw(gpu, plan, frame)?;
+                if let (0.., Some(run)) = (frame, subject.measured.runs.last_mut()) {
+                    run.push(drawn);
+                }
+                progress();
+            }
+        }
+    }
+    let mut measured = subjects.into_iter().map(|subject| subject.measured);
+    Ok(configurations.iter().map(|_| measured.by_ref().take(plan.methods.len()).collect()).collect())
+}
+
+impl<'a> Subject<'a> {
+    /// A renderer with all that does not change from frame to frame.
+    fn new(
+        gpu: &Gpu,
+        configuration: &'a Configuration,
+        target: &Rc<Target>,
+        plan: &Plan,
+        method: Method,
+    ) -> Result<Self> {
+        let input = &configuration.input;
+        let setup = method.setup(configuration.setup);
+        let renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
+        let measured = Measured { method, runs: Vec::new() };
+        let mut subject = Self { configuration, target: target.clone(), renderer, measured };
+        subject.move_clip(plan, -1 - i64::from(plan.warm_up))?;
+        subject.renderer.update(&mut |_| ())?;
+        Ok(subject)
+    }
+
+    fn move_clip(&mut self, plan: &Plan, frame: i64) -> Result<()> {
+        let size_mm = self.configuration.input.volume.size_mm();
+        let clips: Vec<_> = plan.clip.iter().map(|shape| path::clip(shape, size_mm, frame)).collect();
+        Ok(self.renderer.set_clips(&clips)?)
+    }
+
+    /// One frame, as a host draws it.
+    fn draw(&mut self, gpu: &Gpu, plan: &Plan, frame: i64) -> Result<Frame> {
+        let Configuration { input, size, views, .. } = self.configuration;
+        let aspect = size[0] as f32 / size[1] as f32;
+        let views = path::views(input.volume.size_mm(), aspect, *views, frame)?;
+        let look = self.measured.method.look();
+
+        let start = Instant::now();
+        self.move_clip(plan, frame)?;
+        let mut rec = gpu.recorder("frame")?;
+        self.renderer.record_update(&mut rec)?;
+        let Target { colour, depth } = &*self.target;
+        self.renderer.record_draw(&mut rec, &views, &look, colour, depth, *size)?;
+        let stages = rec.submit_and_wait()?;
+        let wall = start.elapsed().as_secs_f64() * 1e3;
+
+        Ok(Frame { wall, stages, categories: self.renderer.categories()? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stage_belongs_to_one_part_and_the_rest_is_overhead() {
+        let stages =
+            [("classify", 1.0), ("bricks", 0.5), ("contextual", 4.0), ("distances", 0.25), ("raycast", 1.75)];
+        let stages = stages.map(|(name, ms)| (name.to_owned(), ms)).to_vec();
+        let mut frame = Frame { wall: 8.0, stages, categories: Categories::default() };
+        assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
+        // Clocks of device and host may disagree by a little; no time is negative.
+        frame.wall = 7.0;
+        assert_eq!(frame.parts()[3], 0.0);
+    }
+}

@@ -1,0 +1,27 @@
+//! The program `stereo-bench`: what a frame costs, for one, two or four views, while head and clip move.
+//!
+//! A frame is what a host does for one: move the clips, record the update of the ambient volume and the drawing of all views into one
+//! command buffer, submit it, wait. Every method has a renderer of its own and all take turns frame by frame (A B A B …) along the
+//! same path ([`path`]), so that whatever slows the machine down slows all of them. Before each run a few frames are not counted. Times of stages
+//! are GPU timestamps; the time of a frame is wall-clock time.
+
+mod args;
+mod bars;
+mod csv;
+mod frames;
+mod machine;
+mod method;
+mod path;
+mod report;
+mod save;
+mod scale;
+mod statistics;
+mod suite;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = args::Cli::parse();
+    cao_cli::end("stereo-bench", if cli.bars { bars::run(&cli) } else { suite::run(&cli) })
+}

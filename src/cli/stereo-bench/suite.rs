@@ -1,0 +1,173 @@
+//! What the command line asks for, measured and reported: the base configuration, then the series.
+
+use super::args::Cli;
+use super::frames::{Configuration, Input, Measured, Plan, measure};
+use super::method::Method;
+use super::path::PERIOD;
+use super::save::Folder;
+use super::{csv, machine, report};
+use anyhow::{Context, Result};
+use cao_cli::args::{open, setup, shape, usage};
+use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
+use cao_gpu::DeviceKind;
+use serde_json::{Map, json};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::rc::Rc;
+
+/// Frames of a run on a software driver, unless the user says how many.
+const SOFTWARE_FRAMES: u32 = 10;
+
+pub fn run(cli: &Cli) -> Result<ExitCode> {
+    let transfer = cli.settings.transfer.as_deref().unwrap_or("auto");
+    let inputs = [cli.input.as_str(), transfer, &cli.clip];
+    let targets: Vec<&Path> = cli.csv.iter().map(PathBuf::as_path).collect();
+    check_targets(&targets, "csv", inputs.into_iter().map(Path::new))?;
+    let mut plan = plan(cli)?;
+    let mut progress = Progress::new();
+    progress.stage("reading");
+    let base = base(cli, transfer)?;
+    let groups = groups(cli, base, transfer)?;
+
+    progress.stage("preparing");
+    let gpu = open_gpu(&cli.global)?;
+    plan.frames = cli.frames.unwrap_or(match gpu.info().kind {
+        // A frame that takes a graphics card milliseconds takes a processor seconds.
+        DeviceKind::Cpu => SOFTWARE_FRAMES,
+        _ => PERIOD,
+    });
+    let kept = cli.save.as_deref().map(|folder| Folder::new(folder, &gpu)).transpose()?;
+    let machine = machine::describe();
+    progress.stage("measuring");
+    let points: usize = groups.iter().map(|group| group.points.len()).sum();
+    let total = plan.total() * points as u64;
+    let mut done = 0;
+    let mut results = Vec::new();
+    for Group { series, points } in groups {
+        let (values, configurations): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        let measured = measure(&gpu, &configurations, &plan, &mut || {
+            done += 1;
+            progress.set(done as f64 / total as f64);
+        })?;
+        let points = values.into_iter().zip(configurations).zip(measured);
+        results.extend(points.map(|((value, configuration), measured)| Outcome {
+            series,
+            value,
+            configuration,
+            measured,
+        }));
+    }
+    check_validation(&gpu)?;
+    drop(progress);
+
+    let mut out = Out::new(&cli.global);
+    out.device(&gpu);
+    out.line(format!("machine   {machine}"));
+    out.json(json!({ "machine": machine, "version": env!("CARGO_PKG_VERSION") }));
+    say(cli, &mut out, &plan, &results);
+    if let Some(base) = results.first() {
+        out.json(json!({ "path": report::path_json(&base.configuration, &plan)? }));
+    }
+    let (table, summary) = (csv::table(&results), out.text().to_owned());
+    if let Some(path) = &cli.csv {
+        std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;
+        out.wrote(path);
+    }
+    if let Some(folder) = kept {
+        for path in folder.write(&gpu, &machine, &table, &summary)? {
+            out.wrote(&path);
+        }
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What was measured in which way, then the numbers: of the base configuration, which comes first, and of every series.
+fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
+    let Some((base, series)) = results.split_first() else { return };
+    let Configuration { input, setup, size, views } = &base.configuration;
+    let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
+    out.volume(&input.name, &input.volume);
+    out.occlusion(&methods.join(" "), setup, &input.volume);
+    if plan.methods.contains(&Method::Sweep) {
+        let (o, spacing) = (Method::Sweep.setup(*setup).occlusion, input.volume.min_spacing());
+        let (rule, step, from) = (o.quadrature.name(), o.lattice_step(spacing), o.lattice_offset(spacing));
+        out.line(format!(
+            "          of sweeps quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
+        ));
+    }
+    out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
+    out.line(format!("clip      {}", cli.clip));
+    out.line(match cli.all_voxels {
+        true => "voxels    all",
+        false => "voxels    those that a sample with opacity can touch",
+    });
+    out.line(report::tables(plan, &base.measured).trim_end());
+    out.json(json!({
+        "clip": cli.clip,
+        "all_voxels": cli.all_voxels,
+        "runs": plan.runs,
+        "frames_a_run": plan.frames,
+        "warm_up_frames": plan.warm_up,
+    }));
+    out.json(report::as_json(base, None));
+    let mut scale = Map::new();
+    for points in series.chunk_by(|a, b| a.series == b.series) {
+        out.line(report::series_table(points).trim_end_matches('\n'));
+        let values = points.iter().map(|point| report::as_json(point, points.first()));
+        scale.insert(points[0].series.into(), values.collect());
+    }
+    out.json(json!({ "scale": scale }));
+}
+
+/// One configuration with what was measured.
+pub struct Outcome {
+    /// Name of the series; "base" for what the command line says.
+    pub series: &'static str,
+    /// What is varied, in words.
+    pub value: String,
+    pub configuration: Configuration,
+    /// In the order of the methods.
+    pub measured: Vec<Measured>,
+}
+
+/// Configurations that take turns.
+struct Group {
+    series: &'static str,
+    /// The value of what is varied, in words, and the configuration.
+    points: Vec<(String, Configuration)>,
+}
+
+/// The base configuration by itself, then every series.
+fn groups(cli: &Cli, base: Configuration, transfer: &str) -> Result<Vec<Group>> {
+    let mut groups = vec![Group { series: "base", points: vec![(String::new(), base.clone())] }];
+    for series in &cli.scale {
+        if groups.iter().any(|group| group.series == series.name()) {
+            return Err(usage(format!("--scale: {} is given twice", series.name())));
+        }
+        groups.push(Group { series: series.name(), points: series.configurations(&base, transfer)? });
+    }
+    Ok(groups)
+}
+
+fn plan(cli: &Cli) -> Result<Plan> {
+    for (n, method) in cli.methods.iter().enumerate() {
+        if cli.methods[..n].contains(method) {
+            return Err(usage(format!("--methods: {method} is given twice")));
+        }
+    }
+    let clip = match cli.clip.as_str() {
+        "none" => None,
+        name => Some(shape(name).with_context(|| format!("--clip {name}"))?),
+    };
+    let methods = cli.methods.clone();
+    Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up })
+}
+
+fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
+    let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
+    let setup = setup(&cli.settings, &volume, cao_model::methods::Method::Cao, cli.all_voxels)?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
+    Ok(Configuration { input, setup, size: cli.size, views: cli.views })
+}

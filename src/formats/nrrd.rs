@@ -1,0 +1,359 @@
+//! NRRD, versions 1 to 5: <https://teem.sourceforge.net/nrrd/format.html>.
+//!
+//! Origin and directions come out in RAS when the header names an anatomical space, as they are otherwise. As teem,
+//! the format's own library, does, unknown fields are refused: a misspelt `spacings` must not become a wrong distance.
+
+use std::path::Path;
+
+use crate::Result;
+use crate::grid::{self, Grid};
+use crate::payload::{Encoding, Part, Payload, Skip};
+use crate::text::{Fields, Lines, data_files, quoted};
+use crate::volume::{assemble, bad};
+use cao_model::values::{Endian, Kind};
+use cao_model::volume::{Volume, check_spacing, voxel_count};
+
+/// All fields of the format. White space and case do not matter in a field's name.
+const FIELDS: [&str; 28] = [
+    "axis maxs",
+    "axis mins",
+    "block size",
+    "byte skip",
+    "centers",
+    "content",
+    "data file",
+    "dimension",
+    "encoding",
+    "endian",
+    "kinds",
+    "labels",
+    "line skip",
+    "max",
+    "measurement frame",
+    "min",
+    "number",
+    "old max",
+    "old min",
+    "sample units",
+    "sizes",
+    "space",
+    "space dimension",
+    "space directions",
+    "space origin",
+    "space units",
+    "spacings",
+    "thicknesses",
+];
+/// Fields with a second name, and `type` and `units`, which have none.
+const MORE_FIELDS: [(&str, &str); 3] = [("centerings", "centers"), ("type", "type"), ("units", "units")];
+
+/// Whether a file begins as NRRD files do.
+pub(crate) fn is_nrrd(head: &[u8]) -> bool {
+    head.starts_with(b"NRRD0")
+}
+
+/// Reads a file with attached or detached data.
+pub(crate) fn read(path: &Path) -> Result<Volume> {
+    let header = Header::read(path)?;
+    let axes = header.spatial_axes()?;
+    let dims = axes.map(|a| header.sizes[a]);
+    let count = voxel_count(dims).map_err(|p| bad(path, "sizes", p))?;
+    let grid = header.grid(axes)?;
+    let payload = header.payload()?;
+    let values = payload.read(path, "data file", count)?;
+    assemble(path, dims.map(|d| d as usize), grid, values, (1.0, 0.0))
+}
+
+struct Header<'a> {
+    fields: Fields<'a>,
+    sizes: Vec<u64>,
+    /// File names after `data file: LIST`.
+    list: Vec<String>,
+    /// Byte after the header.
+    end: u64,
+}
+
+impl<'a> Header<'a> {
+    fn read(path: &'a Path) -> Result<Self> {
+        let mut lines = Lines::open(path)?;
+        let magic = lines.next()?.unwrap_or_default();
+        let magic = magic.trim_end();
+        if !["NRRD00.01", "NRRD0001", "NRRD0002", "NRRD0003", "NRRD0004", "NRRD0005"].contains(&magic) {
+            return Err(bad(path, "magic", format!("{}, expected NRRD0001 to NRRD0005", quoted(magic))));
+        }
+        let mut fields = Fields::new(path);
+        let mut list = Vec::new();
+        while let Some(line) = lines.next()? {
+            if line.is_empty() {
+                break;
+            }
+            if line.starts_with('#') {
+                continue;
+            }
+            let Some((name, value)) = split(&line) else {
+                return Err(bad(path, "header", format!("line {}, expected `field: value`", quoted(&line))));
+            };
+            let Some(value) = value else { continue };
+            let name = field(name).ok_or_else(|| bad(path, name.trim(), "is not a field of the format"))?;
+            fields.insert(name, value)?;
+            if name == "data file" && value.split_whitespace().next() == Some("LIST") {
+                list = lines.rest()?;
+                break;
+            }
+        }
+        let dimension: [usize; 1] = fields.array("dimension", "a whole number")?.unwrap_or_default();
+        let sizes = fields.numbers("sizes", "whole numbers of samples along the axes")?;
+        let sizes: Vec<u64> = sizes.ok_or_else(|| bad(path, "sizes", "missing, expected in every header"))?;
+        let header = Header { fields, sizes, list, end: lines.position() };
+        header.fields.require("dimension")?;
+        if header.sizes.len() != dimension[0] {
+            let problem =
+                format!("{} numbers, expected {} as `dimension` says", header.sizes.len(), dimension[0]);
+            return Err(bad(path, "sizes", problem));
+        }
+        Ok(header)
+    }
+
+    fn path(&self) -> &'a Path {
+        self.fields.path
+    }
+
+    /// Which three axes are those of space: all, or all but one of a single sample.
+    fn spatial_axes(&self) -> Result<[usize; 3]> {
+        let directions = self.directions()?;
+        let kinds: Vec<String> = self.fields.get("kinds").map(words).unwrap_or_default();
+        let spatial = |a: usize| {
+            let no_vector = directions.as_ref().is_some_and(|d| d[a].is_none());
+            let kind = kinds.get(a).map_or(String::new(), |k| k.to_lowercase());
+            !no_vector && ["", "domain", "space", "none", "???"].contains(&kind.as_str())
+        };
+        let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
+        if axes.len() == 4 {
+            // The one that says it is not spatial, else the slowest.
+            let single = |a: &usize| self.sizes[*a] == 1;
+            let drop = axes.iter().copied().find(|a| single(a) && !spatial(*a));
+            if let Some(drop) = drop.or_else(|| axes.iter().copied().rev().find(single)) {
+                axes.remove(drop);
+            }
+        }
+        let Ok(axes) = <[usize; 3]>::try_from(axes) else {
+            let problem = format!(
+                "{} axes of sizes {:?}, expected a scalar volume of 3 (or 4 when one is of size 1)",
+                self.sizes.len(),
+                self.sizes
+            );
+            return Err(bad(self.path(), "dimension", problem));
+        };
+        if let Some(a) = axes.into_iter().find(|a| !spatial(*a)) {
+            let field = if directions.is_some_and(|d| d[a].is_none()) { "space directions" } else { "kinds" };
+            let problem =
+                format!("axis {a} is not an axis of space (vectors or a list?), expected three that are");
+            return Err(bad(self.path(), field, problem));
+        }
+        Ok(axes)
+    }
+
+    fn grid(&self, axes: [usize; 3]) -> Result<Grid> {
+        let (path, fields) = (self.path(), &self.fields);
+        let flip = self.space()?;
+        let units = self.lengths_of_units("space units", 3)?;
+        let mut field = "spacings";
+        let mut grid = match self.directions()? {
+            Some(directions) => {
+                field = "space directions";
+                if fields.get("spacings").is_some() {
+                    return Err(bad(
+                        path,
+                        "spacings",
+                        "given beside `space directions`, expected one of both",
+                    ));
+                }
+                // `spatial_axes` made sure that these have vectors.
+                let vectors = axes.map(|a| directions[a].unwrap_or_default());
+                let vectors = vectors.map(|v| std::array::from_fn(|i| v[i] * units[i]));
+                let (spacing, directions) = grid::axes(vectors).map_err(|p| bad(path, field, p))?;
+                Grid { directions, ..Grid::plain(spacing) }
+            }
+            None => Grid::plain(self.spacings(axes)?),
+        };
+        check_spacing(grid.spacing).map_err(|p| bad(path, field, p))?;
+        if let Some(text) = fields.get("space origin").filter(|t| *t != "none") {
+            let origin = vectors(text).filter(|v| v.len() == 1).and_then(|v| v[0]);
+            let origin = origin.filter(|o| o.iter().all(|x| x.is_finite()));
+            let origin = origin.ok_or_else(|| {
+                bad(path, "space origin", format!("{}, expected (x,y,z) of finite numbers", quoted(text)))
+            })?;
+            grid.origin = std::array::from_fn(|i| origin[i] * units[i]);
+        }
+        Ok(match flip {
+            Some(flip) => grid.flipped(flip),
+            None => grid,
+        })
+    }
+
+    /// Signs that turn the named space into RAS; `None` for a space without anatomical meaning.
+    fn space(&self) -> Result<Option<[f64; 3]>> {
+        if let Some([n]) = self.fields.array::<u64, 1>("space dimension", "3")?
+            && n != 3
+        {
+            return Err(bad(self.path(), "space dimension", format!("{n}, expected 3")));
+        }
+        let Some(space) = self.fields.get("space") else { return Ok(None) };
+        Ok(match space.to_lowercase().as_str() {
+            "right-anterior-superior" | "ras" => Some([1.0, 1.0, 1.0]),
+            "left-anterior-superior" | "las" => Some([-1.0, 1.0, 1.0]),
+            "left-posterior-superior" | "lps" => Some([-1.0, -1.0, 1.0]),
+            "scanner-xyz" | "3d-right-handed" | "3d-left-handed" => None,
+            _ => {
+                let expected = "RAS, LAS, LPS, scanner-xyz, 3D-right-handed or 3D-left-handed";
+                return Err(bad(self.path(), "space", format!("{}, expected {expected}", quoted(space))));
+            }
+        })
+    }
+
+    /// Spacings in mm: as given, from the axes' ends, or 1.
+    fn spacings(&self, axes: [usize; 3]) -> Result<[f64; 3]> {
+        let dimension = self.sizes.len();
+        let per_axis = |name: &str| -> Result<Option<Vec<f64>>> {
+            let Some(numbers) = self.fields.numbers::<f64>(name, "a number for every axis")? else {
+                return Ok(None);
+            };
+            if numbers.len() != dimension {
+                return Err(bad(
+                    self.path(),
+                    name,
+                    format!("{} numbers, expected {dimension}", numbers.len()),
+                ));
+            }
+            Ok(Some(numbers))
+        };
+        let units = self.lengths_of_units("units", dimension)?;
+        if let Some(spacings) = per_axis("spacings")? {
+            return Ok(axes.map(|a| spacings[a] * units[a]));
+        }
+        let (Some(mins), Some(maxs)) = (per_axis("axis mins")?, per_axis("axis maxs")?) else {
+            return Ok([1.0; 3]);
+        };
+        let centers = self.fields.get("centers").map(words).unwrap_or_default();
+        Ok(axes.map(|a| {
+            // Ends are outer faces of cells, or positions of the first and last node.
+            let node = centers.get(a).is_some_and(|c| c.eq_ignore_ascii_case("node"));
+            let steps = if node { self.sizes[a] as f64 - 1.0 } else { self.sizes[a] as f64 };
+            (maxs[a] - mins[a]) / steps * units[a]
+        }))
+    }
+
+    /// Millimetres of each quoted unit; units that are missing or not of length count as mm.
+    fn lengths_of_units(&self, field: &str, count: usize) -> Result<Vec<f64>> {
+        let Some(text) = self.fields.get(field) else { return Ok(vec![1.0; count]) };
+        let units = words(text);
+        if units.len() != count {
+            return Err(bad(self.path(), field, format!("{} units, expected {count}", units.len())));
+        }
+        Ok(units.iter().map(|u| grid::millimetres(u).unwrap_or(1.0)).collect())
+    }
+
+    /// One vector an axis, `None` where the header has `none`.
+    fn directions(&self) -> Result<Option<Vec<Option<[f64; 3]>>>> {
+        let Some(text) = self.fields.get("space directions") else { return Ok(None) };
+        let dimension = self.sizes.len();
+        match vectors(text) {
+            Some(vectors) if vectors.len() == dimension => Ok(Some(vectors)),
+            _ => {
+                let problem = format!("{}, expected (x,y,z) or none, {dimension} times", quoted(text));
+                Err(bad(self.path(), "space directions", problem))
+            }
+        }
+    }
+
+    fn payload(&self) -> Result<Payload> {
+        let (path, fields) = (self.path(), &self.fields);
+        let kind = fields.require("type")?;
+        let kind = Kind::parse(kind)
+            .ok_or_else(|| bad(path, "type", format!("{}, expected {}", quoted(kind), Kind::EXPECTED)))?;
+        let encoding = fields.require("encoding")?;
+        let encoding = match encoding.to_ascii_lowercase().as_str() {
+            "raw" => Encoding::Raw,
+            "gz" | "gzip" => Encoding::Deflate,
+            "txt" | "text" | "ascii" => Encoding::Ascii,
+            _ => {
+                return Err(bad(
+                    path,
+                    "encoding",
+                    format!("{}, expected raw, gzip or ascii", quoted(encoding)),
+                ));
+            }
+        };
+        let endian = match fields.get("endian") {
+            Some(name) => Endian::parse(name)
+                .ok_or_else(|| bad(path, "endian", format!("{}, expected little or big", quoted(name))))?,
+            // Nothing to order.
+            None if kind.bytes() == 1 || encoding == Encoding::Ascii => Endian::Little,
+            None => {
+                return Err(bad(
+                    path,
+                    "endian",
+                    format!("missing, expected little or big for {}", kind.name()),
+                ));
+            }
+        };
+        let [lines] = fields.array("line skip", "a number of lines")?.unwrap_or([0]);
+        let [bytes] = fields.array::<i64, 1>("byte skip", "a number of bytes, or -1")?.unwrap_or([0]);
+        let skip = match bytes {
+            -1 if encoding == Encoding::Raw => Skip::AllButLast,
+            -1 => return Err(bad(path, "byte skip", "-1 is possible with encoding raw only")),
+            _ => {
+                let bytes = bytes.try_into();
+                let bytes =
+                    bytes.map_err(|_| bad(path, "byte skip", "negative, expected 0 or more, or -1"))?;
+                Skip::Ahead { lines, bytes }
+            }
+        };
+        let parts = match fields.get("data file") {
+            Some(value) => data_files(path, "data file", value, &self.list, &self.sizes)?,
+            None => vec![Part { path: path.into(), start: self.end }],
+        };
+        Ok(Payload { kind, endian, encoding, skip, parts })
+    }
+}
+
+/// `field: value`, or `key:=value` with no value returned, because keys are free and mean nothing here.
+fn split(line: &str) -> Option<(&str, Option<&str>)> {
+    let (name, value) = line.split_once(':')?;
+    let free = value.starts_with('=') || (!value.starts_with(' ') && value.contains(":="));
+    Some((name, (!free).then_some(value)))
+}
+
+/// The field's name as [`FIELDS`] spells it.
+fn field(name: &str) -> Option<&'static str> {
+    let squeeze = |s: &str| s.split_whitespace().collect::<String>().to_ascii_lowercase();
+    let name = squeeze(name);
+    let plain = FIELDS.iter().copied().find(|f| squeeze(f) == name);
+    plain.or_else(|| MORE_FIELDS.iter().find(|(alias, _)| *alias == name).map(|(_, f)| *f))
+}
+
+/// Words, quoted ones with the white space in them.
+fn words(text: &str) -> Vec<String> {
+    if text.contains('"') {
+        return text.split('"').skip(1).step_by(2).map(str::to_string).collect();
+    }
+    text.split_whitespace().map(str::to_string).collect()
+}
+
+/// `(x,y,z) none (x,y,z) …`; `None` when it is anything else.
+fn vectors(text: &str) -> Option<Vec<Option<[f64; 3]>>> {
+    let mut vectors = Vec::new();
+    let mut rest = text.trim();
+    while !rest.is_empty() {
+        if let Some(after) = rest.strip_prefix("none") {
+            vectors.push(None);
+            rest = after.trim_start();
+            continue;
+        }
+        let (vector, after) = rest.strip_prefix('(')?.split_once(')')?;
+        let numbers: Option<Vec<f64>> = vector.split(',').map(|n| n.trim().parse().ok()).collect();
+        vectors.push(Some(numbers?.try_into().ok()?));
+        rest = after.trim_start();
+    }
+    Some(vectors)
+}

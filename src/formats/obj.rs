@@ -1,0 +1,104 @@
+//! Wavefront OBJ: the triangles of clip meshes.
+
+use crate::{Error, Result};
+use cao_model::mesh::TriangleMesh;
+use glam::Vec3;
+use std::io::Cursor;
+use std::path::Path;
+
+/// Reads a Wavefront OBJ file: all objects of the file as one mesh. Faces with more than three corners become
+/// triangle fans; points, lines, normals, texture coordinates, colours and materials are ignored.
+///
+/// # Errors
+/// [`Error::Io`] when the file cannot be read, [`cao_model::Error::Mesh`] naming the file (and the line where there is one)
+/// when it is not an OBJ file, has no faces, or has coordinates that are not finite.
+pub fn load(path: &Path) -> Result<TriangleMesh> {
+    let name = path.display().to_string();
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    parse(name, &String::from_utf8_lossy(&bytes))
+}
+
+/// As [`load`], from the text of an OBJ file; `name` stands for the file in errors.
+///
+/// # Errors
+/// As [`load`], without [`Error::Io`].
+pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
+    let name = name.into();
+    let geometry = geometry_lines(text);
+    let mut reader = Cursor::new(geometry.as_bytes());
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
+    // Materials are never asked for: `geometry_lines` leaves no line that names one.
+    let read = tobj::load_obj_buf(&mut reader, &options, |_| Err(tobj::LoadError::GenericFailure));
+    let models = match read {
+        Ok((models, _)) => models,
+        Err(tobj::LoadError::FaceVertexOutOfBounds) => {
+            let vertices = geometry.lines().filter(|l| l.starts_with('v')).count();
+            let problem = format!("a face names a vertex that is not there; the file has {vertices}");
+            return Err(cao_model::Error::Mesh { name, problem }.into());
+        }
+        Err(error) => {
+            // tobj reads line by line and stops in the one it cannot read.
+            let consumed = &geometry.as_bytes()[..reader.position() as usize];
+            let line = consumed.iter().filter(|&&b| b == b'\n').count();
+            let found: String =
+                text.lines().nth(line.saturating_sub(1)).unwrap_or("").chars().take(60).collect();
+            let problem = format!("line {line}: {error}: \"{found}\"");
+            return Err(cao_model::Error::Mesh { name, problem }.into());
+        }
+    };
+    let mut positions = Vec::new();
+    let mut faces = Vec::new();
+    for tobj::Model { mesh, .. } in &models {
+        let first = positions.len() as u32;
+        positions.extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
+        faces.extend(mesh.indices.chunks_exact(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
+    }
+    Ok(TriangleMesh::new(name, &positions, &faces)?)
+}
+
+/// The lines of an OBJ file that make geometry (positions, and the position index of each face corner), every other
+/// line left empty so that line numbers stay. tobj trusts what it does not need here: a texture index near the
+/// largest integer overflows in it, a malformed material file panics, half-coloured vertices are refused.
+fn geometry_lines(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        let mut line = line.to_owned();
+        let mut joined = 0;
+        // A backslash continues a line; in a comment or a name it is only a character.
+        while line.trim_start().starts_with(['v', 'f']) && line.ends_with('\\') {
+            line.pop();
+            line.push_str(lines.next().unwrap_or(""));
+            joined += 1;
+        }
+        let line = line.split('#').next().unwrap_or("");
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                let words: Vec<&str> = words.collect();
+                // A fourth number is a weight; six or seven are a position and a colour.
+                let take = if words.len() == 4 { 4 } else { 3 };
+                out.push('v');
+                words.iter().take(take).for_each(|word| {
+                    out.push(' ');
+                    out.push_str(word);
+                });
+            }
+            Some("f") => {
+                out.push('f');
+                words.for_each(|word| {
+                    out.push(' ');
+                    out.push_str(word.split('/').next().unwrap_or(""));
+                });
+            }
+            _ => {}
+        }
+        (0..=joined).for_each(|_| out.push('\n'));
+    }
+    out
+}

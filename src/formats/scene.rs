@@ -1,0 +1,727 @@
+//! The scene file: everything that one picture needs, in TOML.
+//!
+//! Paths are relative to the scene file. Every key but `volume` may be left out. Unknown keys and impossible values are
+//! refused by name. Lengths are millimetres in the volume's frame (origin at its centre, axes as its index axes),
+//! angles degrees, colours sRGB.
+//!
+//! ```
+//! let scene = cao_formats::Scene::from_toml(
+//!     r##"
+//!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
+//!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
+//!
+//!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
+//!
+//!     [[clip]]                         # none, one, or up to eight
+//!     shape = "sphere"                 # plane box sphere cylinder cone torus; or instead: mesh = "bunny.obj"
+//!     mode = "remove"                  # inside invisible; "keep": outside invisible
+//!     translate_mm = [20, 0, 30]
+//!     rotate_deg = [0, 45, 0]          # about the fixed axes x, then y, then z
+//!     scale = 40                       # or one number an axis: [40, 40, 20]
+//!
+//!     [occlusion]
+//!     method = "sweep"                 # lines of voxels, where opacities change; "cao": rays, where clips change; "lao": all rays
+//!     rays = "26w"                     # "6" "14w" "26w" "50w", weighted; 14 26 54, equal weights; default of cao and lao: 26
+//!     quadrature = "segment"           # left cell segment; sweeps: segment; default of cao and lao: left, the paper's sum
+//!     radius_mm = 20                   # default: 20 of the smallest spacing
+//!     offset_mm = 0.5                  # where rays start; default: half a step
+//!     step_mm = 1                      # default: the smallest spacing; of sweeps 1.75 (50w, 54: 1.45) times that, at most
+//!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
+//!
+//!     [stereo]
+//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y
+//!     elevation_deg = 25
+//!     distance_mm = 400                # of the eyes from the centre; default: it fills the picture
+//!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
+//!     ## target_mm = [0, 0, 0]
+//!     ## up = [0, 0, 1]
+//!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance, at most 63
+//!     fov_deg = 35                     # vertical
+//!     screen_mm = 400                  # distance of the plane without parallax; default: the target
+//!
+//!     [image]
+//!     width = 1024                     # of one eye
+//!     height = 1024
+//!     step_mm = 0.5                    # between samples of a ray; default: a quarter of the smallest spacing
+//!     background = "#17191d"
+//!
+//!     [shading]
+//!     ambient = 0.6                    # light from everywhere
+//!     diffuse = 0.6                    # light that depends on the gradient
+//!     light = [-0.4, -0.7, 0.6]        # direction towards it
+//!     occlusion = true                 # false: the picture without ambient occlusion
+//!     jitter = true                    # against banding
+//!     "##,
+//!     std::path::Path::new("."),
+//! )?;
+//! assert_eq!(scene.clips.len(), 1);
+//! # Ok::<(), cao_formats::Error>(())
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::Vec3;
+use serde::Deserialize;
+use toml::Value;
+
+use crate::toml_value::{in_line, number, parse_colour, shown};
+use crate::{Error, Result, obj, transfer};
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::look::Look;
+use cao_model::methods::Method;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::{Scope, Setup};
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+
+/// Largest edge of one eye's image in pixels: what every Vulkan device with a desktop driver holds.
+pub const MAX_IMAGE: u32 = 16384;
+
+/// Everything that one picture needs. Meshes and transfer functions are loaded, the volume is only named.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Where the volume comes from.
+    pub volume: VolumeSource,
+    /// Where opacity and colour come from; see [`Scene::transfer`].
+    pub transfer: TransferSource,
+    /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are closed and face outward.
+    pub clips: Vec<Clip>,
+    /// Ambient occlusion; see [`OcclusionSettings::setup`].
+    pub occlusion: OcclusionSettings,
+    /// The eyes; see [`Stereo::rig`].
+    pub stereo: Stereo,
+    /// The picture.
+    pub image: ImageSettings,
+    /// How samples are lit and where they lie.
+    pub look: Look,
+}
+
+/// Where a volume comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum VolumeSource {
+    /// A built-in volume, as `builtin:NAME:SIZE`.
+    Builtin(String),
+    /// A file that describes itself.
+    File(PathBuf),
+    /// A file of values only.
+    Raw {
+        /// The file.
+        path: PathBuf,
+        /// Voxels along x, y, z; x fastest.
+        dims: [usize; 3],
+        /// Name of the values' type, such as `uint8`.
+        kind: String,
+        /// Distance of voxel centres in mm.
+        spacing_mm: [f64; 3],
+        /// Most significant byte first?
+        big_endian: bool,
+    },
+}
+
+impl VolumeSource {
+    /// What the user calls a volume on the command line: `builtin:NAME:SIZE` or a path.
+    pub fn parse(spec: &str) -> Self {
+        if spec.starts_with("builtin:") { Self::Builtin(spec.into()) } else { Self::File(spec.into()) }
+    }
+}
+
+/// Where opacity and colour come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TransferSource {
+    /// A preset, which depends on the data's range.
+    Preset(String),
+    /// From a file or from the scene itself.
+    Given(TransferFunction),
+}
+
+/// Ambient occlusion as the scene file has it: what is `None` follows from the volume's spacing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OcclusionSettings {
+    /// All voxels, or those that a clip affects.
+    pub method: Method,
+    /// Which voxels get a value.
+    pub scope: Scope,
+    /// Directions and weights.
+    pub rays: RaySet,
+    /// Rule along a ray.
+    pub quadrature: Quadrature,
+    /// Radius in mm; `None` is 20 of the smallest spacing.
+    pub radius_mm: Option<f32>,
+    /// Start of a ray in mm; `None` is half a step.
+    pub offset_mm: Option<f32>,
+    /// Distance of samples in mm; `None` is the smallest spacing.
+    pub step_mm: Option<f32>,
+}
+
+impl Default for OcclusionSettings {
+    fn default() -> Self {
+        let method = Method::default();
+        Self {
+            method,
+            scope: Scope::Needed,
+            rays: method.rays(),
+            quadrature: method.quadrature(),
+            radius_mm: None,
+            offset_mm: None,
+            step_mm: None,
+        }
+    }
+}
+
+impl OcclusionSettings {
+    /// The settings for a volume whose smallest spacing is `min_spacing` mm, checked.
+    ///
+    /// # Errors
+    /// As [`Occlusion::check`], keys with `occlusion.` before them.
+    pub fn setup(&self, min_spacing: f64) -> Result<Setup> {
+        let usual = Setup::of(self.method, min_spacing);
+        let occlusion = Occlusion {
+            rays: self.rays,
+            quadrature: self.quadrature,
+            radius_mm: self.radius_mm.unwrap_or(usual.occlusion.radius_mm),
+            offset_mm: self.offset_mm,
+            step_mm: self.step_mm,
+        };
+        occlusion.check(min_spacing).map_err(|error| error.under("occlusion"))?;
+        Ok(Setup { occlusion, scope: self.scope, ..usual })
+    }
+}
+
+/// The eyes as the scene file has them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stereo {
+    /// Where they are and where they look.
+    pub viewpoint: Viewpoint,
+    /// Distance between the eyes in mm; `None` is 1/15 of the distance to the target, at most 63 mm.
+    pub ipd_mm: Option<f32>,
+    /// Vertical field of view in degrees; `None` is that of [`StereoRig::framing`].
+    pub fov_deg: Option<f32>,
+    /// Distance in mm of the plane without parallax; `None` is the distance to the target.
+    pub screen_mm: Option<f32>,
+}
+
+/// Where the eyes are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Viewpoint {
+    /// Looking at the volume's centre from this side.
+    Framing {
+        /// About +z, from -y.
+        azimuth_deg: f32,
+        /// Above the xy plane.
+        elevation_deg: f32,
+        /// From the centre in mm; `None` lets the volume fill the picture.
+        distance_mm: Option<f32>,
+    },
+    /// At a place of the user's own.
+    Placed {
+        /// Midpoint of the eyes in mm.
+        position_mm: Vec3,
+        /// Point looked at in mm.
+        target_mm: Vec3,
+        /// Direction that is up in the picture.
+        up: Vec3,
+    },
+}
+
+impl Default for Stereo {
+    fn default() -> Self {
+        let viewpoint = Viewpoint::Framing { azimuth_deg: 30.0, elevation_deg: 25.0, distance_mm: None };
+        Self { viewpoint, ipd_mm: None, fov_deg: None, screen_mm: None }
+    }
+}
+
+impl Stereo {
+    /// The rig for a volume of this size in mm.
+    pub fn rig(&self, size_mm: [f64; 3]) -> StereoRig {
+        let mut rig = match self.viewpoint {
+            Viewpoint::Framing { azimuth_deg, elevation_deg, .. } => {
+                StereoRig::framing(size_mm, azimuth_deg, elevation_deg)
+            }
+            Viewpoint::Placed { position_mm, target_mm, up } => StereoRig {
+                position: position_mm,
+                target: target_mm,
+                up,
+                ..StereoRig::framing(size_mm, 0.0, 0.0)
+            },
+        };
+        if let Viewpoint::Framing { distance_mm: Some(distance), .. } = self.viewpoint {
+            rig.position = rig.position.normalize() * distance;
+        }
+        // Framing's own rule, for the distance that it has become.
+        let comfortable = ((rig.target - rig.position).length() / 15.0).min(63.0);
+        rig.ipd_mm = self.ipd_mm.unwrap_or(comfortable);
+        rig.fov_deg = self.fov_deg.unwrap_or(rig.fov_deg);
+        rig.screen_mm = self.screen_mm;
+        rig
+    }
+}
+
+/// The picture of one eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSettings {
+    /// Pixels across, 1 to [`MAX_IMAGE`].
+    pub width: u32,
+    /// Pixels down, 1 to [`MAX_IMAGE`].
+    pub height: u32,
+    /// Linear r, g, b behind the volume.
+    pub background: [f32; 3],
+}
+
+impl Default for ImageSettings {
+    fn default() -> Self {
+        // sRGB #17191d: dark enough for bone, light enough to see occlusion against.
+        Self { width: 1024, height: 1024, background: [0.008_568_126, 0.009_721_218, 0.012_286_488] }
+    }
+}
+
+impl Scene {
+    /// The scene of a volume and nothing else, as `cao render VOLUME` draws it.
+    pub fn default_for(volume: VolumeSource) -> Self {
+        Self {
+            volume,
+            transfer: TransferSource::Preset("auto".into()),
+            clips: Vec::new(),
+            occlusion: OcclusionSettings::default(),
+            stereo: Stereo::default(),
+            image: ImageSettings::default(),
+            look: Look::default(),
+        }
+    }
+
+    /// Reads a scene file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file, key, what was found and what would do; the
+    /// errors of [`TriangleMesh::load_obj`], [`TriangleMesh::outward`] and [`TransferFunction::load`] for files it
+    /// names.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::from_toml(&text, path.parent().unwrap_or(Path::new("."))).map_err(|error| error.in_file(path))
+    }
+
+    /// Reads the text described at the [module](self); paths in it are relative to `base`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`], with [`Error::Config`] in place of [`Error::File`].
+    pub fn from_toml(text: &str, base: &Path) -> Result<Self> {
+        let file: SceneFile =
+            toml::from_str(text).map_err(|error| Error::refused("scene", in_line(text, &error)))?;
+        if file.clip.len() > Clip::MAX {
+            return Err(Error::refused(
+                "clip",
+                format!("{} clips: expected at most {}", file.clip.len(), Clip::MAX),
+            ));
+        }
+        let clips = file.clip.into_iter().enumerate();
+        let step_mm = file.image.step_mm.map(|mm| mm as f32);
+        Ok(Self {
+            volume: volume(file.volume, base)?,
+            transfer: file
+                .transfer
+                .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
+            clips: clips.map(|(i, clip)| clip.read(&format!("clip[{i}]"), base)).collect::<Result<_>>()?,
+            occlusion: file.occlusion.read()?,
+            stereo: file.stereo.read()?,
+            image: file.image.read()?,
+            look: Look { step_mm, ..file.shading.read()? },
+        })
+    }
+
+    /// The transfer function for data that run over `range` (smallest, largest value).
+    ///
+    /// # Errors
+    /// As [`TransferFunction::preset`].
+    pub fn transfer(&self, range: (f64, f64)) -> Result<TransferFunction> {
+        match &self.transfer {
+            TransferSource::Preset(name) => Ok(TransferFunction::preset(name, range)?),
+            TransferSource::Given(transfer) => Ok(transfer.clone()),
+        }
+    }
+}
+
+/// The file's keys; values that may have two forms stay TOML until they are looked at.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    volume: Value,
+    transfer: Option<Value>,
+    #[serde(default)]
+    clip: Vec<ClipFile>,
+    #[serde(default)]
+    occlusion: OcclusionFile,
+    #[serde(default)]
+    stereo: StereoFile,
+    #[serde(default)]
+    image: ImageFile,
+    #[serde(default)]
+    shading: ShadingFile,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFile {
+    raw: PathBuf,
+    dims: [usize; 3],
+    #[serde(rename = "type")]
+    kind: String,
+    #[serde(default = "unit_spacing")]
+    spacing_mm: [f64; 3],
+    #[serde(default)]
+    endian: EndianFile,
+}
+
+fn unit_spacing() -> [f64; 3] {
+    [1.0; 3]
+}
+
+#[derive(Deserialize, Default, PartialEq)]
+#[serde(rename_all = "lowercase")]
+enum EndianFile {
+    #[default]
+    Little,
+    Big,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ClipFile {
+    shape: Option<String>,
+    mesh: Option<PathBuf>,
+    mode: Option<String>,
+    translate_mm: Option<[f64; 3]>,
+    rotate_deg: Option<[f64; 3]>,
+    scale: Option<Value>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct OcclusionFile {
+    method: Option<String>,
+    rays: Option<Value>,
+    quadrature: Option<String>,
+    radius_mm: Option<f64>,
+    offset_mm: Option<f64>,
+    step_mm: Option<f64>,
+    scope: Option<String>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct StereoFile {
+    azimuth_deg: Option<f64>,
+    elevation_deg: Option<f64>,
+    distance_mm: Option<f64>,
+    position_mm: Option<[f64; 3]>,
+    target_mm: Option<[f64; 3]>,
+    up: Option<[f64; 3]>,
+    ipd_mm: Option<f64>,
+    fov_deg: Option<f64>,
+    screen_mm: Option<f64>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct ImageFile {
+    width: Option<i64>,
+    height: Option<i64>,
+    step_mm: Option<f64>,
+    background: Option<Value>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct ShadingFile {
+    ambient: Option<f64>,
+    diffuse: Option<f64>,
+    light: Option<[f64; 3]>,
+    occlusion: Option<bool>,
+    jitter: Option<bool>,
+}
+
+fn volume(value: Value, base: &Path) -> Result<VolumeSource> {
+    match value {
+        Value::String(spec) => match VolumeSource::parse(&spec) {
+            VolumeSource::File(path) => Ok(VolumeSource::File(existing("volume", base, &path)?)),
+            other => Ok(other),
+        },
+        Value::Table(table) => {
+            let raw: RawFile = table
+                .try_into()
+                .map_err(|error: toml::de::Error| Error::refused("volume", error.message()))?;
+            if let Some(mm) = raw.spacing_mm.iter().find(|mm| !(mm.is_finite() && **mm > 0.0)) {
+                return Err(Error::refused("volume.spacing_mm", format!("{mm}: expected lengths > 0 mm")));
+            }
+            if raw.dims.contains(&0) {
+                return Err(Error::refused(
+                    "volume.dims",
+                    format!("{:?}: expected at least 1 voxel along each axis", raw.dims),
+                ));
+            }
+            Ok(VolumeSource::Raw {
+                path: existing("volume.raw", base, &raw.raw)?,
+                dims: raw.dims,
+                kind: raw.kind,
+                spacing_mm: raw.spacing_mm,
+                big_endian: raw.endian == EndianFile::Big,
+            })
+        }
+        other => {
+            let problem = format!(
+                "{}: expected a file, builtin:NAME:SIZE, or a table with raw, dims, type",
+                shown(&other)
+            );
+            Err(Error::refused("volume", problem))
+        }
+    }
+}
+
+fn transfer_source(value: Value, base: &Path) -> Result<TransferSource> {
+    match value {
+        Value::String(name) if TransferFunction::is_preset(&name) => Ok(TransferSource::Preset(name)),
+        Value::String(file) => {
+            let path = existing("transfer", base, Path::new(&file))?;
+            transfer::read(&path).map(TransferSource::Given)
+        }
+        Value::Table(table) => {
+            transfer::from_table(table).map(TransferSource::Given).map_err(|error| error.under("transfer"))
+        }
+        other => Err(Error::refused(
+            "transfer",
+            format!("{}: expected a preset, a file, or a table", shown(&other)),
+        )),
+    }
+}
+
+impl ClipFile {
+    fn read(self, key: &str, base: &Path) -> Result<Clip> {
+        let shape = match (&self.shape, &self.mesh) {
+            (Some(name), None) => {
+                Shape::parse(name).map_err(|error| Error::from(error).renamed(&format!("{key}.shape")))?
+            }
+            (None, Some(path)) => {
+                let path = existing(&format!("{key}.mesh"), base, path)?;
+                Shape::Mesh(Arc::new(obj::load(&path)?.outward()?))
+            }
+            _ => return Err(Error::refused(key, "expected either shape or mesh")),
+        };
+        let mode = self.mode.as_deref().map_or(Ok(Mode::Remove), Mode::parse);
+        let mode = mode.map_err(|error| Error::from(error).renamed(&format!("{key}.mode")))?;
+        let mut pose = Pose::default();
+        // One at a time, so that a refusal is under the key that caused it.
+        let mut checked = |name: &str, set: &dyn Fn(&mut Pose)| {
+            set(&mut pose);
+            pose.check().map_err(|error| Error::from(error).renamed(&format!("{key}.{name}")))
+        };
+        if let Some(mm) = self.translate_mm {
+            checked("translate_mm", &|pose| pose.translate_mm = vector(mm))?;
+        }
+        if let Some(degrees) = self.rotate_deg {
+            checked("rotate_deg", &|pose| pose.rotate_deg = vector(degrees))?;
+        }
+        if let Some(value) = &self.scale {
+            let factors = match value {
+                Value::Array(axes) => axes.iter().map(number).collect::<Option<Vec<f64>>>(),
+                single => number(single).map(|factor| vec![factor; 3]),
+            };
+            let factors: Option<[f64; 3]> = factors.and_then(|axes| axes.try_into().ok());
+            let expected = || {
+                Error::refused(
+                    &format!("{key}.scale"),
+                    format!("{}: expected a number > 0 or three", shown(value)),
+                )
+            };
+            let factors = factors.ok_or_else(expected)?;
+            checked("scale", &|pose| pose.scale = vector(factors))?;
+        }
+        Ok(Clip { shape, mode, pose })
+    }
+}
+
+impl OcclusionFile {
+    fn read(self) -> Result<OcclusionSettings> {
+        let default = OcclusionSettings::default();
+        let in_occlusion = |error: cao_model::Error| error.under("occlusion");
+        let quadrature =
+            self.quadrature.as_deref().map(Quadrature::parse).transpose().map_err(in_occlusion)?;
+        let method = self.method.as_deref().map(Method::parse).transpose().map_err(in_occlusion)?;
+        let method = method.unwrap_or(Method::for_rule(quadrature));
+        let rays = match &self.rays {
+            None => method.rays(),
+            // 26 and "26" are the same set.
+            Some(Value::String(name)) => RaySet::parse(name).map_err(in_occlusion)?,
+            Some(other) => RaySet::parse(&shown(other)).map_err(in_occlusion)?,
+        };
+        let scope = match self.scope.as_deref() {
+            None => default.scope,
+            Some("needed") => Scope::Needed,
+            Some("all") => Scope::All,
+            Some(other) => {
+                return Err(Error::refused("occlusion.scope", format!("{other:?}: expected needed or all")));
+            }
+        };
+        for (key, value, zero) in [
+            ("occlusion.radius_mm", self.radius_mm, true),
+            ("occlusion.offset_mm", self.offset_mm, true),
+            ("occlusion.step_mm", self.step_mm, false),
+        ] {
+            length(key, value, zero)?;
+        }
+        Ok(OcclusionSettings {
+            method,
+            scope,
+            rays,
+            quadrature: quadrature.unwrap_or(method.quadrature()),
+            radius_mm: self.radius_mm.map(|mm| mm as f32),
+            offset_mm: self.offset_mm.map(|mm| mm as f32),
+            step_mm: self.step_mm.map(|mm| mm as f32),
+        })
+    }
+}
+
+impl StereoFile {
+    fn read(self) -> Result<Stereo> {
+        let viewpoint = match self.position_mm {
+            Some(position) => self.placed(vector(position))?,
+            None => self.framing()?,
+        };
+        length("stereo.ipd_mm", self.ipd_mm, true)?;
+        length("stereo.screen_mm", self.screen_mm, false)?;
+        if let Some(degrees) = self.fov_deg.filter(|degrees| !(*degrees > 0.0 && *degrees < 179.0)) {
+            return Err(Error::refused(
+                "stereo.fov_deg",
+                format!("{degrees}: expected more than 0 and less than 179 degrees"),
+            ));
+        }
+        Ok(Stereo {
+            viewpoint,
+            ipd_mm: self.ipd_mm.map(|mm| mm as f32),
+            fov_deg: self.fov_deg.map(|degrees| degrees as f32),
+            screen_mm: self.screen_mm.map(|mm| mm as f32),
+        })
+    }
+
+    fn framing(&self) -> Result<Viewpoint> {
+        for (key, unused) in [("stereo.target_mm", self.target_mm), ("stereo.up", self.up)] {
+            if unused.is_some() {
+                return Err(Error::refused(key, "has no effect without stereo.position_mm"));
+            }
+        }
+        let (azimuth, elevation) = (self.azimuth_deg.unwrap_or(30.0), self.elevation_deg.unwrap_or(25.0));
+        if !azimuth.is_finite() {
+            return Err(Error::refused(
+                "stereo.azimuth_deg",
+                format!("{azimuth}: expected an angle in degrees"),
+            ));
+        }
+        if !(-90.0..=90.0).contains(&elevation) {
+            return Err(Error::refused(
+                "stereo.elevation_deg",
+                format!("{elevation}: expected -90 to 90 degrees"),
+            ));
+        }
+        length("stereo.distance_mm", self.distance_mm, false)?;
+        Ok(Viewpoint::Framing {
+            azimuth_deg: azimuth as f32,
+            elevation_deg: elevation as f32,
+            distance_mm: self.distance_mm.map(|mm| mm as f32),
+        })
+    }
+
+    fn placed(&self, position_mm: Vec3) -> Result<Viewpoint> {
+        for (key, unused) in [
+            ("stereo.azimuth_deg", self.azimuth_deg),
+            ("stereo.elevation_deg", self.elevation_deg),
+            ("stereo.distance_mm", self.distance_mm),
+        ] {
+            if unused.is_some() {
+                return Err(Error::refused(key, "has no effect together with stereo.position_mm"));
+            }
+        }
+        let (target_mm, up) =
+            (vector(self.target_mm.unwrap_or_default()), vector(self.up.unwrap_or([0.0, 0.0, 1.0])));
+        // The rig knows what it can look at, and names its keys.
+        let rig = StereoRig {
+            position: position_mm,
+            target: target_mm,
+            up,
+            ..StereoRig::framing([1.0; 3], 0.0, 0.0)
+        };
+        rig.views(1.0, 1.0, 2.0).map_err(|error| match error {
+            cao_model::Error::Config { what, problem } if what == "stereo.target" => {
+                Error::refused("stereo.target_mm", problem)
+            }
+            other => other.into(),
+        })?;
+        Ok(Viewpoint::Placed { position_mm, target_mm, up })
+    }
+}
+
+impl ImageFile {
+    fn read(self) -> Result<ImageSettings> {
+        let default = ImageSettings::default();
+        let pixels = |key: &str, value: Option<i64>, default: u32| match value {
+            None => Ok(default),
+            Some(n) if (1..=i64::from(MAX_IMAGE)).contains(&n) => Ok(n as u32),
+            Some(n) => Err(Error::refused(key, format!("{n}: expected 1 to {MAX_IMAGE} pixels"))),
+        };
+        length("image.step_mm", self.step_mm, false)?;
+        Ok(ImageSettings {
+            width: pixels("image.width", self.width, default.width)?,
+            height: pixels("image.height", self.height, default.height)?,
+            background: self
+                .background
+                .map_or(Ok(default.background), |colour| parse_colour("image.background", &colour))?,
+        })
+    }
+}
+
+impl ShadingFile {
+    fn read(self) -> Result<Look> {
+        let default = Look::default();
+        for (key, value) in [("shading.ambient", self.ambient), ("shading.diffuse", self.diffuse)] {
+            if let Some(share) = value.filter(|share| !(0.0..=10.0).contains(share)) {
+                return Err(Error::refused(key, format!("{share}: expected a number from 0 to 10")));
+            }
+        }
+        let light = match self.light {
+            None => default.light,
+            Some(towards) => vector(towards).try_normalize().ok_or_else(|| {
+                Error::refused(
+                    "shading.light",
+                    format!("{towards:?}: expected a direction other than [0, 0, 0]"),
+                )
+            })?,
+        };
+        Ok(Look {
+            ambient: self.ambient.map_or(default.ambient, |share| share as f32),
+            diffuse: self.diffuse.map_or(default.diffuse, |share| share as f32),
+            light,
+            occluded: self.occlusion.unwrap_or(default.occluded),
+            jitter: self.jitter.unwrap_or(default.jitter),
+            ..default
+        })
+    }
+}
+
+/// A length in mm that an f32 can hold: > 0, or >= 0 where `zero` may be.
+fn length(key: &str, mm: Option<f64>, zero: bool) -> Result<()> {
+    match mm {
+        Some(mm) if !((mm as f32).is_finite() && mm >= 0.0 && (zero || mm as f32 > 0.0)) => Err(
+            Error::refused(key, format!("{mm}: expected a length {} 0 mm", if zero { ">=" } else { ">" })),
+        ),
+        _ => Ok(()),
+    }
+}
+
+fn existing(key: &str, base: &Path, path: &Path) -> Result<PathBuf> {
+    let path = base.join(path);
+    match path.exists() {
+        true => Ok(path),
+        false => Err(Error::refused(key, format!("there is no file {}", path.display()))),
+    }
+}
+
+fn vector(of: [f64; 3]) -> Vec3 {
+    Vec3::from_array(of.map(|c| c as f32))
+}

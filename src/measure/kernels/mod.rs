@@ -1,0 +1,4 @@
+//! Host sides of the kernels that only measurements use.
+
+pub mod reference;
+pub mod ssao;

@@ -1,0 +1,24 @@
+//! The plain data of `cao`: volumes, transfer functions, clips, views, ray sets, settings and the list of methods. Nothing here
+//! touches a device or a file; lengths are mm, angles degrees, arrays `[x, y, z]` with x fastest in memory.
+
+#![forbid(unsafe_code)]
+
+pub mod builtin;
+pub mod clip;
+pub mod error;
+pub mod lattice;
+pub mod look;
+pub mod mesh;
+pub mod methods;
+pub mod occlusion;
+pub mod settings;
+pub mod transfer;
+pub mod values;
+pub mod view;
+pub mod volume;
+
+pub use error::{Error, Result};
+pub use methods::METHODS;
+
+/// The version whose vectors are in this crate's signatures.
+pub use glam;

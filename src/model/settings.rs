@@ -1,0 +1,106 @@
+//! How occlusion is computed: everything that a renderer can be told about it, as plain data.
+
+use crate::methods::Method;
+use crate::occlusion::Occlusion;
+use crate::{Error, Result};
+
+/// How occlusion is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Rays, quadrature, radius.
+    pub occlusion: Occlusion,
+    /// Which method.
+    pub method: Method,
+    /// Which voxels get a value.
+    pub scope: Scope,
+    /// Samples at cut voxels.
+    pub anti_aliasing: AntiAliasing,
+    /// Depth maps of clip meshes.
+    pub maps: MapSettings,
+}
+
+impl Setup {
+    /// A method with its own rays and rule, 20 voxels of the smallest spacing (mm) far, only needed voxels.
+    pub fn of(method: Method, min_spacing: f64) -> Self {
+        let paper = Occlusion::paper(min_spacing);
+        Self {
+            occlusion: Occlusion { rays: method.rays(), quadrature: method.quadrature(), ..paper },
+            method,
+            scope: Scope::Needed,
+            anti_aliasing: AntiAliasing::N32,
+            maps: MapSettings::default(),
+        }
+    }
+
+    /// The default method: what to use where the paper's numbers are not the point.
+    pub fn new(min_spacing: f64) -> Self {
+        Self::of(Method::default(), min_spacing)
+    }
+}
+
+/// Which voxels get a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    /// Every voxel.
+    All,
+    /// Only voxels with opacity in their 3³: no sample that has opacity interpolates any other. The rest hold 1.
+    Needed,
+}
+
+/// Anti-aliasing samples of voxels that a clip surface passes through, beyond centre and corners: N of CAO eq. (5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AntiAliasing {
+    /// None.
+    N0 = 0,
+    /// 8.
+    N8 = 8,
+    /// 32, as the paper has it.
+    N32 = 32,
+}
+
+/// Settings of the depth maps of clip meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapSettings {
+    /// Pixels along the edge of the depth layers.
+    pub resolution: u32,
+    /// Cells along the edge of the dilation maps.
+    pub cells: u32,
+    /// Most layer pairs, 1 … [`MapSettings::MAX_PAIRS`].
+    pub pairs: u32,
+    /// The paper's recipe instead of the conservative one: eq. (4) as printed, at the layers' resolution and with the ray's
+    /// length as radius. It leaves stale voxels; it exists to show that.
+    pub literal: bool,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        Self { resolution: 512, cells: 128, pairs: Self::MAX_PAIRS, literal: false }
+    }
+}
+
+impl MapSettings {
+    /// Most layer pairs of one mesh.
+    pub const MAX_PAIRS: u32 = 8;
+
+    /// Refuses what no map can be made of.
+    ///
+    /// # Errors
+    /// [`Error::Config`] naming the setting.
+    pub fn check(&self) -> Result<()> {
+        let refuse = |what: &str, problem: String| Err(Error::refused(what, problem));
+        if !(8..=4096).contains(&self.resolution) {
+            return refuse("depth map resolution", format!("{}; expected 8 … 4096 pixels", self.resolution));
+        }
+        if self.literal && self.cells != self.resolution {
+            let wanted = format!("the depth map's, {}, for the literal recipe", self.resolution);
+            return refuse("dilation map resolution", format!("{}; expected {wanted}", self.cells));
+        }
+        if !(4..=4096).contains(&self.cells) {
+            return refuse("dilation map resolution", format!("{}; expected 4 … 4096 cells", self.cells));
+        }
+        if !(1..=Self::MAX_PAIRS).contains(&self.pairs) {
+            return refuse("layer pairs", format!("{}; expected 1 … {}", self.pairs, Self::MAX_PAIRS));
+        }
+        Ok(())
+    }
+}

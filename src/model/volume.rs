@@ -1,0 +1,152 @@
+//! A volume: values on a regular grid, and where it lies.
+
+use crate::values::Values;
+use crate::{Error, Result};
+
+/// What `origin` and `directions` of a [`Volume`] refer to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Space {
+    /// The file does not say, or a frame without anatomical meaning; numbers are as in the file.
+    Unknown,
+    /// The patient: +x right, +y anterior, +z superior. Files in other anatomical frames are turned into this one.
+    Ras,
+}
+
+/// A scalar field on a regular grid.
+///
+/// Distances everywhere in the crate come from `spacing` alone; `origin`, `directions` and `space` are carried from
+/// input to output files and nothing else.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Volume {
+    /// Voxels along x, y, z; x is fastest in memory.
+    pub dims: [usize; 3],
+    /// Distance of neighbouring voxel centres along x, y, z in mm.
+    pub spacing: [f64; 3],
+    /// Position of the centre of voxel (0, 0, 0) in the file's frame, in mm.
+    pub origin: [f64; 3],
+    /// Unit vectors of the index axes x, y, z in the file's frame.
+    pub directions: [[f64; 3]; 3],
+    /// The frame of `origin` and `directions`.
+    pub space: Space,
+    /// Stored values, x fastest.
+    pub values: Values,
+    /// Value = `slope` · stored + `intercept`.
+    pub slope: f64,
+    /// See `slope`.
+    pub intercept: f64,
+}
+
+impl Volume {
+    /// A volume with values as stored, origin 0 and axes as they come.
+    ///
+    /// Errors: [`Error::Config`] when a dimension is 0, the number of values is not the product of `dims`, a spacing
+    /// (mm) is not positive and reasonable, or a value is NaN or infinite.
+    pub fn new(dims: [usize; 3], spacing: [f64; 3], values: Values) -> Result<Self> {
+        let config = |what: &str, problem: String| Error::Config { what: what.into(), problem };
+        let count = voxel_count(dims.map(|d| d as u64)).map_err(|p| config("dims", p))?;
+        check_spacing(spacing).map_err(|p| config("spacing", p))?;
+        if values.len() != count {
+            let problem = format!(
+                "{} values, expected {count} for {} × {} × {} voxels",
+                values.len(),
+                dims[0],
+                dims[1],
+                dims[2]
+            );
+            return Err(config("values", problem));
+        }
+        check_finite(dims, &values).map_err(|p| config("values", p))?;
+        Ok(Self {
+            dims,
+            spacing,
+            origin: [0.0; 3],
+            directions: IDENTITY,
+            space: Space::Unknown,
+            values,
+            slope: 1.0,
+            intercept: 0.0,
+        })
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Never true of a volume that was read or made by [`Volume::new`].
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Value of voxel `i` (x fastest). Panics when `i` is not below [`Volume::len`], as a slice does.
+    pub fn value(&self, i: usize) -> f64 {
+        self.slope * self.values.get(i) + self.intercept
+    }
+
+    /// Value of voxel (x, y, z). Panics outside the volume, as a slice does.
+    pub fn at(&self, x: usize, y: usize, z: usize) -> f64 {
+        assert!(x < self.dims[0] && y < self.dims[1], "voxel ({x}, {y}, {z}) outside {:?}", self.dims);
+        self.value(x + self.dims[0] * (y + self.dims[1] * z))
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> (f64, f64) {
+        let (low, high) = self.values.range().unwrap_or((0.0, 0.0));
+        let (a, b) = (self.slope * low + self.intercept, self.slope * high + self.intercept);
+        (a.min(b), a.max(b))
+    }
+
+    /// Smallest of the three spacings in mm.
+    pub fn min_spacing(&self) -> f64 {
+        self.spacing.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Extent `dims · spacing` in mm: from outer face to outer face.
+    pub fn size_mm(&self) -> [f64; 3] {
+        std::array::from_fn(|a| self.dims[a] as f64 * self.spacing[a])
+    }
+
+    /// World position in mm of an index position: origin at the volume's centre, axes as the volume's, (0, 0, 0) is
+    /// the centre of the first voxel.
+    pub fn to_world(&self, index: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| (index[a] - (self.dims[a] as f64 - 1.0) / 2.0) * self.spacing[a])
+    }
+}
+
+/// Axes as they come.
+pub const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Below and above no voxel grid is meant: 10⁻⁹ mm is a hundredth of an atom, 10⁹ mm a thousand kilometres.
+const SPACING_LIMITS_MM: (f64, f64) = (1e-9, 1e9);
+
+/// Product of the dimensions, if that many voxels can be addressed.
+pub fn voxel_count(dims: [u64; 3]) -> Result<usize, String> {
+    let [x, y, z] = dims;
+    if dims.contains(&0) {
+        return Err(format!("{x} × {y} × {z}, expected at least 1 voxel along every axis"));
+    }
+    // 8 is the largest value type in bytes.
+    let fits = x.checked_mul(y).and_then(|n| n.checked_mul(z)).filter(|&n| n <= isize::MAX as u64 / 8);
+    fits.map(|n| n as usize)
+        .ok_or_else(|| format!("{x} × {y} × {z} voxels are more than any memory can hold"))
+}
+
+/// Says what is wrong with a spacing in mm.
+pub fn check_spacing(spacing: [f64; 3]) -> Result<(), String> {
+    let (low, high) = SPACING_LIMITS_MM;
+    match spacing.iter().find(|s| !(**s >= low && **s <= high)) {
+        Some(s) => Err(format!("{s} mm, expected a positive distance between {low:e} and {high:e} mm")),
+        None => Ok(()),
+    }
+}
+
+/// Says which values are no numbers.
+pub fn check_finite(dims: [usize; 3], values: &Values) -> Result<(), String> {
+    let Some((first, count)) = values.non_finite() else { return Ok(()) };
+    let (x, y, z) = (first % dims[0], first / dims[0] % dims[1], first / dims[0] / dims[1]);
+    Err(format!(
+        "{count} of {} values are NaN or infinite, the first ({}) at voxel ({x}, {y}, {z}); expected finite values only",
+        values.len(),
+        values.get(first)
+    ))
+}

@@ -1,0 +1,7 @@
+//! Clips: depth layers, dilation maps, classification.
+
+pub mod classify;
+pub mod clip_bricks;
+pub mod clips;
+pub mod dilate;
+pub mod peel;

@@ -1,0 +1,4 @@
+//! Pictures.
+
+pub mod brick_distance;
+pub mod raycast;

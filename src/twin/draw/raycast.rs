@@ -1,0 +1,479 @@
+//! The volume as one eye sees it (CAO §3.5 step 6).
+//!
+//! Along the ray of each pixel, front to back, samples at t_begin + (k + phase)·Δt in mm:
+//!
+//! ```text
+//! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
+//! C  += (1 − A) α_k · TF_c(V(p_k)) · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
+//! A  += (1 − A) α_k                                                         until (1 − A)·L·E′(C) ≤ ½/255
+//! ```
+//!
+//! where L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
+//! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
+
+use crate::clip::clips::{ClipField, visible};
+use crate::{Grid, each, trilinear, trilinear_clamped};
+use cao_model::look::Look;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::View;
+use glam::{DVec3, Vec2, Vec3};
+
+/// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
+pub const TOLERANCE: f64 = 0.5;
+/// The ambient factor is shown times this: a flat wall's is ½.
+pub const GAIN: f64 = 2.0;
+/// Below this gradient of opacity per mm there is no surface, and the diffuse term is 1.
+pub const FLAT_PER_MM: f64 = 1e-4;
+
+/// What is drawn; fields are x fastest.
+#[derive(Clone, Copy)]
+pub struct Frame<'a> {
+    /// Shape of the fields.
+    pub grid: Grid,
+    /// Data values V.
+    pub values: &'a [f32],
+    /// Opacity and colour of data values.
+    pub transfer: &'a TransferFunction,
+    /// Length ℓ in mm that opacities are for.
+    pub reference_mm: f64,
+    /// V_o, opacity after clipping.
+    pub opacity: &'a [f32],
+    /// V_AO, ambient factor.
+    pub ambient: &'a [f32],
+    /// Clips.
+    pub clips: &'a [ClipField],
+    /// Distance Δt of samples in mm.
+    pub step_mm: f64,
+    /// Light.
+    pub look: Look,
+}
+
+/// Image of one eye, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Linear RGBA, premultiplied.
+    pub colour: Vec<[f32; 4]>,
+    /// Vulkan depth 0 … 1 where half of the light is stopped; 1 where never.
+    pub depth: Vec<f32>,
+}
+
+/// Draws `size` = [width, height] pixels.
+pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
+    let ambient = |position| trilinear_clamped(&frame.grid, frame.ambient, position);
+    let (colour, depth) =
+        each(size[0] * size[1], |i| pixel(frame, view, size, i, &mut { ambient })).into_iter().unzip();
+    Image { colour, depth }
+}
+
+/// Index coordinates at which these pixels read the ambient factor, in the order of their rays; where a ray ends depends on what it has
+/// read, and these go as far as the darkest does.
+pub fn ambient_positions(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    pixels: &[usize],
+) -> Vec<Vec<[f64; 3]>> {
+    each(pixels.len(), |i| {
+        let mut positions = Vec::new();
+        pixel(frame, view, size, pixels[i], &mut |position| {
+            positions.push(position);
+            0.0
+        });
+        positions
+    })
+}
+
+/// Draws these pixels with ambient factors of their own instead of the frame's, one for each of [`ambient_positions`].
+pub fn raycast_lit(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    pixels: &[usize],
+    ambient: &[Vec<f64>],
+) -> Image {
+    let (colour, depth) = each(pixels.len(), |i| {
+        let mut ambient = ambient[i].iter();
+        pixel(frame, view, size, pixels[i], &mut |_| *ambient.next().expect("one value a position"))
+    })
+    .into_iter()
+    .unzip();
+    Image { colour, depth }
+}
+
+/// Pixel `index`, its ambient factors from `ambient` of index coordinates.
+fn pixel(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    index: usize,
+    ambient: &mut dyn FnMut([f64; 3]) -> f64,
+) -> ([f32; 4], f32) {
+    let [x, y] = [index % size[0], index / size[0]];
+    let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
+    let (origin, direction) = view.ray(centre / Vec2::new(size[0] as f32, size[1] as f32));
+    let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3());
+    // The view's ray advances 1 mm of depth per unit; samples are spaced along the ray itself.
+    let slant = direction.length();
+    let direction = direction / slant;
+    let box_range = crossing(&frame.grid, origin, direction);
+    let begin = box_range[0].max(f64::from(view.near_mm) * slant);
+    let end = box_range[1].min(f64::from(view.far_mm) * slant);
+    let phase = if frame.look.jitter { gradient_noise(centre) } else { 0.5 };
+
+    let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
+    let samples = (0..).map(|k| begin + (f64::from(k) + phase) * frame.step_mm);
+    let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
+    let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
+    let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
+    let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse);
+    // A white background, or a white sample that faces the light.
+    let brightest = 1.0_f64.max(light * if frame.look.occluded { GAIN } else { 1.0 });
+    let mut hidden_at = f64::NEG_INFINITY;
+    for t in samples.take_while(|&t| t < end) {
+        if frame.transfer.opacity_at(value_at(t)) == 0.0 {
+            continue;
+        }
+        if !shown_at(t) {
+            hidden_at = t;
+            continue;
+        }
+        let follows_hidden = t - hidden_at < 1.5 * frame.step_mm;
+        let t = if follows_hidden { cut(hidden_at, t, shown_at) } else { t };
+        let position = at(t);
+        let value = value_at(t);
+        let opacity = f64::from(frame.transfer.opacity_at(value));
+        let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
+        let shade = if frame.look.occluded { GAIN * ambient(position) } else { 1.0 };
+        let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse) * surface(frame, position);
+        let emitted = Vec3::from_array(frame.transfer.colour_at(value)).as_dvec3();
+        colour += (1.0 - alpha) * covered * shade * light * emitted;
+        alpha += (1.0 - alpha) * covered;
+        if depth == 1.0 && alpha >= 0.5 {
+            depth = vulkan_depth(view, t / slant);
+        }
+        if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
+            break;
+        }
+    }
+    ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
+}
+
+/// Slope of sRGB coding (IEC 61966-2-1) at a linear component; beyond 1, where a screen shows no more, that at 1.
+fn srgb_slope(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 } else { 1.055 / 2.4 * linear.min(1.0).powf(1.0 / 2.4 - 1.0) }
+}
+
+/// Where a ray comes out of a clip, between a hidden and a visible sample, to 1/16 of their distance: a cut face is
+/// shaded at one depth.
+fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..4 {
+        let middle = (hidden + shown) / 2.0;
+        if shown_at(middle) {
+            shown = middle;
+        } else {
+            hidden = middle;
+        }
+    }
+    shown
+}
+
+/// Distances in mm at which a ray enters and leaves the volume, the box of index coordinates −½ … dims − ½; the first
+/// is larger than the second when it misses.
+fn crossing(grid: &Grid, origin: DVec3, direction: DVec3) -> [f64; 2] {
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        let half = grid.dims[axis] as f64 * grid.spacing[axis] / 2.0;
+        if direction[axis] == 0.0 {
+            if origin[axis].abs() > half {
+                return [f64::INFINITY, f64::NEG_INFINITY];
+            }
+            continue;
+        }
+        let a = (-half - origin[axis]) / direction[axis];
+        let b = (half - origin[axis]) / direction[axis];
+        enter = enter.max(a.min(b));
+        leave = leave.min(a.max(b));
+    }
+    [enter, leave]
+}
+
+/// Interleaved gradient noise in [0, 1) of a pixel's centre (Jimenez, SIGGRAPH 2014), against banding.
+fn gradient_noise(centre: Vec2) -> f64 {
+    let [x, y] = centre.to_array().map(f64::from);
+    (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract()
+}
+
+/// |n·l|, or 1 where there is no surface.
+fn surface(frame: &Frame, position: [f64; 3]) -> f64 {
+    let gradient = DVec3::from_array(std::array::from_fn(|axis| {
+        let beside = |shift: f64| {
+            let mut at = position;
+            at[axis] += shift;
+            trilinear(&frame.grid, frame.opacity, at)
+        };
+        (beside(1.0) - beside(-1.0)) / (2.0 * frame.grid.spacing[axis])
+    }));
+    if gradient.length() < FLAT_PER_MM {
+        return 1.0;
+    }
+    gradient.normalize().dot(frame.look.light.as_dvec3()).abs()
+}
+
+/// Depth buffer value at a distance in mm along the view axis.
+fn vulkan_depth(view: &View, distance: f64) -> f64 {
+    let (near, far) = (f64::from(view.near_mm), f64::from(view.far_mm));
+    (far / (far - near) * (1.0 - near / distance)).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clip::classify::tests::{field, random_clip, shapes};
+    use crate::random::Random;
+    use cao_model::clip::{Clip, Mode, Pose, Shape};
+    use cao_model::view::{StereoRig, Tangents};
+    use glam::Quat;
+
+    /// One opacity for every value, colour by value.
+    fn even(opacity: f32) -> TransferFunction {
+        TransferFunction::new(vec![[0.0, opacity]], vec![[0.0, 0.2, 0.4, 0.8]], None).unwrap()
+    }
+
+    /// Fields of one volume.
+    struct Scene {
+        grid: Grid,
+        values: Vec<f32>,
+        transfer: TransferFunction,
+        opacity: Vec<f32>,
+        ambient: Vec<f32>,
+        clips: Vec<ClipField>,
+        look: Look,
+    }
+
+    impl Scene {
+        fn even(opacity: f32) -> Self {
+            let grid = Grid { dims: [10, 12, 8], spacing: [1.0, 1.0, 2.0] };
+            Self {
+                grid,
+                values: vec![0.0; grid.len()],
+                transfer: even(opacity),
+                opacity: vec![opacity; grid.len()],
+                ambient: vec![0.5; grid.len()],
+                clips: Vec::new(),
+                look: Look {
+                    ambient: 0.25,
+                    diffuse: 0.5,
+                    light: Vec3::new(0.0, 0.6, 0.8),
+                    occluded: true,
+                    jitter: false,
+                    ..Look::default()
+                },
+            }
+        }
+
+        fn draw(&self, view: &View, size: [usize; 2], step_mm: f64) -> Image {
+            let frame = Frame {
+                grid: self.grid,
+                values: &self.values,
+                transfer: &self.transfer,
+                reference_mm: 1.0,
+                opacity: &self.opacity,
+                ambient: &self.ambient,
+                clips: &self.clips,
+                step_mm,
+                look: self.look,
+            };
+            raycast(&frame, view, size)
+        }
+    }
+
+    /// An eye on the z axis that looks down it.
+    fn from_above(height: f32) -> View {
+        View {
+            position: Vec3::new(0.0, 0.0, height),
+            orientation: Quat::IDENTITY,
+            tan: Tangents { left: -0.3, right: 0.4, up: 0.35, down: -0.25 },
+            near_mm: 1.0,
+            far_mm: 200.0,
+        }
+    }
+
+    const SIZE: [usize; 2] = [28, 24];
+
+    /// Pixel index → (x, y) of the view axis components.
+    fn slopes(view: &View, i: usize) -> [f32; 2] {
+        let uv = [(i % SIZE[0]) as f32 + 0.5, (i / SIZE[0]) as f32 + 0.5];
+        let t = view.tan;
+        [
+            t.left + (t.right - t.left) * uv[0] / SIZE[0] as f32,
+            t.up + (t.down - t.up) * uv[1] / SIZE[1] as f32,
+        ]
+    }
+
+    #[test]
+    fn empty_volume_is_transparent() {
+        let image = Scene::even(0.0).draw(&from_above(40.0), SIZE, 0.5);
+        assert!(image.colour.iter().all(|&c| c == [0.0; 4]) && image.depth.iter().all(|&d| d == 1.0));
+    }
+
+    /// Through the upper and lower face of the box, 16 mm apart, a ray of slope s covers 1 − (1 − a)^(16·√(1+s²)/ℓ).
+    #[test]
+    fn uniform_slab_has_the_closed_form_alpha() {
+        let view = from_above(100.0);
+        let step = 0.01;
+        for opacity in [0.01, 0.1, 0.2] {
+            let image = Scene::even(opacity).draw(&view, SIZE, step);
+            let mut compared = 0;
+            for (i, &[.., alpha]) in image.colour.iter().enumerate() {
+                let [x, y] = slopes(&view, i);
+                let slant = f64::from(1.0 + x * x + y * y).sqrt();
+                // At the lower face, 108 mm below the eye, the box ends at 5 and 6 mm.
+                if x.abs() * 108.0 < 5.0 && y.abs() * 108.0 < 6.0 {
+                    let exact = 1.0 - (1.0 - f64::from(opacity)).powf(16.0 * slant);
+                    // Half a step more or less.
+                    let bound = 0.5 * step * -(1.0 - f64::from(opacity)).ln() + 1e-6;
+                    assert!((f64::from(alpha) - exact).abs() < bound, "{alpha} {exact}");
+                    compared += 1;
+                }
+            }
+            assert!(compared > 10);
+        }
+    }
+
+    #[test]
+    fn opaque_box_covers_its_pixels_at_its_depth() {
+        let view = from_above(30.0);
+        let image = Scene::even(1.0).draw(&view, SIZE, 0.1);
+        let mut covered = 0;
+        for (i, (&[.., alpha], &depth)) in image.colour.iter().zip(&image.depth).enumerate() {
+            let [x, y] = slopes(&view, i);
+            // The upper face, 22 mm below the eye, hides the rest of the box.
+            let expected = x.abs() * 22.0 < 5.0 && y.abs() * 22.0 < 6.0;
+            assert_eq!(alpha == 1.0, expected, "{x} {y}");
+            assert_eq!(alpha == 0.0, !expected, "{x} {y}");
+            if expected {
+                let on_face = view.project(Vec3::new(x * 22.0, y * 22.0, 8.0)).unwrap().1;
+                let slope = 200.0 / 199.0 / (22.0 * 22.0);
+                assert!(depth >= on_face - 1e-5 && depth < on_face + 0.1 * slope, "{depth} {on_face}");
+                covered += 1;
+            } else {
+                assert_eq!(depth, 1.0);
+            }
+        }
+        assert!(covered > 50 && covered < image.depth.len() - 50, "{covered}");
+    }
+
+    /// On the upper face the gradient is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
+    #[test]
+    fn colour_is_shaded_by_ambient_factor_and_gradient() {
+        let view = from_above(30.0);
+        let mut scene = Scene::even(1.0);
+        let middle = SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2;
+        let check = |scene: &Scene, shade: f32| {
+            let found = scene.draw(&view, SIZE, 0.1).colour[middle];
+            for (found, expected) in found.iter().zip([0.2 * shade, 0.4 * shade, 0.8 * shade, 1.0]) {
+                assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+            }
+        };
+        check(&scene, GAIN as f32 * 0.5 * (0.25 + 0.5 * 0.8));
+        scene.look.occluded = false;
+        check(&scene, 0.25 + 0.5 * 0.8);
+        // Opacity that varies nowhere has no surface.
+        scene.opacity.fill(0.0);
+        check(&scene, 0.25 + 0.5);
+    }
+
+    #[test]
+    fn clipped_samples_show_nothing() {
+        let view = from_above(100.0);
+        let mut scene = Scene::even(0.1);
+        // Nearest to the axis: the ray leaves through the lower face.
+        let axis = 14 * SIZE[0] + 12;
+        let full = scene.draw(&view, SIZE, 0.05).colour[axis][3];
+        let mut clip = |mode| {
+            let clip = Clip { shape: Shape::Plane, mode, pose: Pose::default() };
+            scene.clips = vec![field(&clip, &scene.grid, 1.0)];
+            scene.draw(&view, SIZE, 0.05).colour[axis][3]
+        };
+        // The plane z = 0 halves the way: the two transmittances multiply to the whole.
+        let (lower, upper) = (clip(Mode::Remove), clip(Mode::Keep));
+        assert!((lower - upper).abs() < 1e-2 && lower < full - 0.1);
+        assert!(((1.0 - lower) * (1.0 - upper) - (1.0 - full)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn an_eye_inside_sees_from_its_near_plane_on() {
+        let scene = Scene::even(1.0);
+        let image = scene.draw(&from_above(0.5), SIZE, 0.25);
+        assert!(image.colour.iter().all(|c| c[3] == 1.0));
+        // The first sample lies half a step of depth (at most) behind the near plane.
+        assert!(image.depth.iter().all(|&d| d > 0.0 && d < 0.13));
+        // A near plane behind the volume leaves nothing; so does a far plane before it.
+        for (near_mm, far_mm) in [(20.0, 30.0), (0.1, 1.0)] {
+            let view = View { near_mm, far_mm, ..from_above(10.0) };
+            assert!(scene.draw(&view, SIZE, 0.25).colour.iter().all(|c| c[3] == 0.0));
+        }
+    }
+
+    #[test]
+    fn equal_eyes_see_equal_images() {
+        let mut scene = Scene::even(0.15);
+        scene.look.jitter = true;
+        let rig = StereoRig::framing(std::array::from_fn(|i| 2.0 * [5.0, 6.0, 8.0][i]), 30.0, 20.0);
+        let draw =
+            |rig: StereoRig| rig.views(1.2, 1.0, 300.0).unwrap().map(|v| scene.draw(&v, [12, 10], 0.5));
+        let [left, right] = draw(StereoRig { ipd_mm: 0.0, ..rig });
+        assert_eq!(left, right);
+        let [left, right] = draw(rig);
+        assert_ne!(left, right);
+    }
+
+    /// Jitter moves samples, it does not change what is there.
+    #[test]
+    fn jitter_changes_alpha_by_less_than_a_step() {
+        let mut scene = Scene::even(0.1);
+        let view = from_above(100.0);
+        let still = scene.draw(&view, SIZE, 0.5);
+        scene.look.jitter = true;
+        let moved = scene.draw(&view, SIZE, 0.5);
+        let largest = still.colour.iter().zip(&moved.colour).map(|(a, b)| (a[3] - b[3]).abs());
+        let largest = largest.fold(0.0, f32::max);
+        assert!(largest > 0.0 && largest < 0.1 * 0.5, "{largest}");
+        let noise: Vec<f64> =
+            (0..1000).map(|i| gradient_noise(Vec2::new((i % 40) as f32, (i / 40) as f32))).collect();
+        assert!(noise.iter().all(|n| (0.0..1.0).contains(n)));
+        assert!((noise.iter().sum::<f64>() / 1000.0 - 0.5).abs() < 0.02);
+    }
+
+    #[test]
+    fn no_pose_makes_a_nan() {
+        let mut random = Random(61);
+        let grid = Grid { dims: [6, 1, 9], spacing: [1.0, 3.0, 0.7] };
+        for _ in 0..60 {
+            let mut scene = Scene::even(0.5);
+            scene.grid = grid;
+            scene.opacity = random.opacities(grid.len());
+            scene.ambient = random.opacities(grid.len());
+            scene.values = random.opacities(grid.len());
+            scene.transfer.opacity = vec![[0.0, 0.0], [1.0, 1.0]];
+            let all = shapes();
+            let shape = &all[(random.unit() * all.len() as f32) as usize];
+            scene.clips = vec![field(&random_clip(shape, &grid, &mut random), &grid, 1.0)];
+            let mut view = from_above(0.0);
+            // Half of them on a grid plane, looking along an axis: rays that only touch.
+            if random.unit() < 0.5 {
+                view.position = random.vector(-3.0, 3.0).round() + Vec3::splat(0.5);
+                view.tan = Tangents { left: -0.5, right: 0.5, up: 0.5, down: -0.5 };
+            } else {
+                view.position = random.vector(-8.0, 8.0);
+                view.orientation = Quat::from_rotation_y(random.within(0.0, 6.0))
+                    * Quat::from_rotation_x(random.within(0.0, 6.0));
+            }
+            view.near_mm = random.within(0.01, 2.0);
+            let image = scene.draw(&view, [7, 7], 0.4);
+            for (colour, depth) in image.colour.iter().zip(&image.depth) {
+                assert!(colour.iter().all(|c| (0.0..=1.0).contains(c)) && (0.0..=1.0).contains(depth));
+            }
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! What methods are measured against.
+
+pub mod reference;
+pub mod ssao;
