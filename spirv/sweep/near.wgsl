@@ -32,7 +32,7 @@ struct Todo {
     brick: array<u32>,
 }
 
-struct Count {
+struct Chosen {
     // to do
     bricks: atomic<u32>,
     // bounds of the bricks to compute anew, x, y, z, and of those that changed
@@ -57,7 +57,7 @@ var<immediate> params: NearParams;
 @group(0) @binding(1) var<storage, read_write> after: Distance;
 @group(0) @binding(2) var<storage, read> contact: Contact;
 @group(0) @binding(3) var<storage, read_write> todo: Todo;
-@group(0) @binding(4) var<storage, read_write> count: Count;
+@group(0) @binding(4) var<storage, read_write> chosen: Chosen;
 @group(0) @binding(5) var<storage, read_write> solid: Solid;
 @group(0) @binding(6) var<storage, read_write> valued: Valued;
 @group(0) @binding(7) var<storage, read> changed: BrickList;
@@ -86,8 +86,8 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
 
 fn bound(brick: vec3<u32>, first: u32) {
     for (var axis = 0u; axis < 3u; axis++) {
-        atomicMin(&count.low[first + axis], brick[axis]);
-        atomicMax(&count.high[first + axis], brick[axis]);
+        atomicMin(&chosen.low[first + axis], brick[axis]);
+        atomicMax(&chosen.high[first + axis], brick[axis]);
     }
 }
 
@@ -125,7 +125,7 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
         // A value that is not there, or opacities that are not, cannot be amended.
         let anew = params.anew == 1u || valued.brick[index] == 0u || changed.count > params.capacity;
         word |= select(TODO, TODO | ANEW, anew);
-        atomicAdd(&count.bricks, 1u);
+        atomicAdd(&chosen.bricks, 1u);
         if anew {
             bound(own, 0u);
         }

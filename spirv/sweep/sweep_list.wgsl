@@ -35,7 +35,7 @@ struct Todo {
 }
 
 // As near.wgsl writes them.
-struct Bounds {
+struct Chosen {
     bricks: u32,
     low: array<u32, 6>,
     high: array<u32, 6>,
@@ -61,7 +61,7 @@ var<immediate> params: ListParams;
 @group(0) @binding(0) var<storage, read> directions: Directions;
 @group(0) @binding(1) var<storage, read> todo: Todo;
 @group(0) @binding(2) var<storage, read_write> list: CountedList;
-@group(0) @binding(3) var<storage, read> bounds: Bounds;
+@group(0) @binding(3) var<storage, read> chosen: Chosen;
 
 // The voxels from x, in the volume, to the end of its cell or of the volume, whichever comes first.
 fn piece(x: i32, size: i32) -> i32 {
@@ -129,8 +129,8 @@ fn first_wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i3
 
     // Where there is something at all.
     let kind = 3u * params.amend;
-    let first = vec3(bounds.low[kind], bounds.low[kind + 1u], bounds.low[kind + 2u]);
-    let end = vec3(bounds.high[kind], bounds.high[kind + 1u], bounds.high[kind + 2u]);
+    let first = vec3(chosen.low[kind], chosen.low[kind + 1u], chosen.low[kind + 2u]);
+    let end = vec3(chosen.high[kind], chosen.high[kind + 1u], chosen.high[kind + 2u]);
     let axes = line_axes(d.axis);
     let extent = line_extent(d.axis, dims);
     let ends = origin + vec2(i - beside, last + beside) * stride;
@@ -170,7 +170,7 @@ fn add_run(direction: u32, run: Run) {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let d = directions.direction[id.y];
-    if id.x >= d.count || bounds.low[3u * params.amend] > bounds.high[3u * params.amend] {
+    if id.x >= d.count || chosen.low[3u * params.amend] > chosen.high[3u * params.amend] {
         return;
     }
     let dims = vec3<i32>(params.dims);

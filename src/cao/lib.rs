@@ -83,10 +83,14 @@
 pub mod cast;
 pub mod clip;
 pub mod draw;
+pub mod drive;
 pub mod error;
 pub mod field;
+pub mod host;
+pub mod method;
 pub mod renderer;
-pub mod stage;
+pub mod stages;
+pub mod subject;
 pub mod sweep;
 pub mod verify;
 

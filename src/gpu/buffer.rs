@@ -23,6 +23,7 @@ pub enum BufferUse {
 
 /// A buffer. Dropping it frees it, once the recorders that used it are gone too; with a host's command buffer the host must keep the
 /// [`Recorded`](super::Recorded) until the device has run it.
+#[derive(Clone)]
 pub struct Buffer(pub(crate) Arc<BufferInner>);
 
 pub(crate) struct BufferInner {

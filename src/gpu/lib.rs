@@ -45,5 +45,5 @@ pub use info::{DeviceInfo, DeviceKind};
 pub use pipeline::{Blend, Cull, DepthTest, GraphicsDesc, Pipeline};
 pub use recorder::Recorder;
 pub use shader::Shader;
-pub use timing::{Recorded, Timings};
+pub use timing::{Phase, Recorded, Stage, Timing, Timings};
 pub use validation::ValidationLog;

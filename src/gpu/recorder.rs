@@ -6,7 +6,7 @@ use super::{
     bind::{Bind, Keep, Resolved, resolve},
     device::{Inner, vulkan},
     hazard::{Hazards, Touch},
-    timing::{Recorded, Stages, Timings},
+    timing::{Recorded, Stage, Stages, Timings},
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -219,9 +219,9 @@ impl Recorder {
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the device is out of memory.
-    pub fn stage(&mut self, name: &str) -> Result<()> {
+    pub fn stage(&mut self, stage: Stage) -> Result<()> {
         // SAFETY: `cmd` is recording (ours, or by the promise of `record_into`), outside a rendering pass.
-        unsafe { self.stages.begin(self.cmd, name) }
+        unsafe { self.stages.begin(self.cmd, stage) }
     }
 
     /// Ends the innermost stage.

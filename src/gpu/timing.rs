@@ -8,8 +8,105 @@ use crate::{Error, Result};
 use ash::vk;
 use std::{ffi::CString, sync::Arc};
 
-/// Name and milliseconds of each stage, in recording order; empty if the queue has no timestamps.
-pub type Timings = Vec<(String, f64)>;
+/// What a stage is for, in the order of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Phase {
+    /// Made once for many frames: maps of clip meshes, tables.
+    Prepare,
+    /// Values to opacities.
+    Opacity,
+    /// Clips.
+    Clip,
+    /// Ambient occlusion.
+    Ambient,
+    /// Pictures.
+    Draw,
+}
+
+impl Phase {
+    /// Every phase.
+    pub const ALL: [Self; 5] = [Self::Prepare, Self::Opacity, Self::Clip, Self::Ambient, Self::Draw];
+}
+
+/// A part of a frame whose time is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stage {
+    /// What people read; programs go by the phase, or compare whole stages.
+    pub name: &'static str,
+    /// What it is for.
+    pub phase: Phase,
+}
+
+impl Stage {
+    /// A stage of this name and phase.
+    pub const fn new(name: &'static str, phase: Phase) -> Self {
+        Self { name, phase }
+    }
+}
+
+/// Time of a stage.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timing {
+    /// Which.
+    pub stage: Stage,
+    /// Milliseconds.
+    pub ms: f64,
+}
+
+/// Time of each stage, in recording order; empty if the queue has no timestamps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Timings(pub Vec<Timing>);
+
+impl Timings {
+    /// None.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a stage's time.
+    pub fn push(&mut self, stage: Stage, ms: f64) {
+        self.0.push(Timing { stage, ms });
+    }
+
+    /// Milliseconds of all stages.
+    pub fn total(&self) -> f64 {
+        self.iter().map(|timing| timing.ms).sum()
+    }
+
+    /// Milliseconds of the stages of a phase.
+    pub fn of(&self, phase: Phase) -> f64 {
+        self.iter().filter(|timing| timing.stage.phase == phase).map(|timing| timing.ms).sum()
+    }
+}
+
+impl std::ops::Deref for Timings {
+    type Target = [Timing];
+
+    fn deref(&self) -> &[Timing] {
+        &self.0
+    }
+}
+
+impl IntoIterator for Timings {
+    type Item = Timing;
+    type IntoIter = std::vec::IntoIter<Timing>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}
+
+impl FromIterator<Timing> for Timings {
+    fn from_iter<T: IntoIterator<Item = Timing>>(timings: T) -> Self {
+        Self(timings.into_iter().collect())
+    }
+}
+
+impl Extend<Timing> for Timings {
+    fn extend<T: IntoIterator<Item = Timing>>(&mut self, timings: T) {
+        self.0.extend(timings);
+    }
+}
 
 /// Stages of one query pool; another pool is made when they are used up.
 const STAGES_PER_POOL: u32 = 64;
@@ -18,20 +115,20 @@ const STAGES_PER_POOL: u32 = 64;
 pub(crate) struct Stages {
     gpu: Arc<Inner>,
     pools: Vec<vk::QueryPool>,
-    names: Vec<String>,
+    stages: Vec<Stage>,
     /// Indices of the stages that have begun and not ended, innermost last.
     open: Vec<u32>,
 }
 
 impl Stages {
     pub fn new(gpu: Arc<Inner>) -> Self {
-        Self { gpu, pools: Vec::new(), names: Vec::new(), open: Vec::new() }
+        Self { gpu, pools: Vec::new(), stages: Vec::new(), open: Vec::new() }
     }
 
     /// # Safety
     /// `cmd` must be recording, outside a rendering pass.
-    pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, name: &str) -> Result<()> {
-        let stage = self.names.len() as u32;
+    pub unsafe fn begin(&mut self, cmd: vk::CommandBuffer, what: Stage) -> Result<()> {
+        let (stage, name) = (self.stages.len() as u32, what.name);
         // SAFETY: the caller's promise; a pool is reset in the same command buffer before its first timestamp.
         unsafe {
             if self.gpu.timestamp_mask != 0 && stage.is_multiple_of(STAGES_PER_POOL) {
@@ -49,7 +146,7 @@ impl Stages {
             }
             self.write(cmd, stage, 0);
         }
-        self.names.push(name.into());
+        self.stages.push(what);
         self.open.push(stage);
         Ok(())
     }
@@ -65,8 +162,7 @@ impl Stages {
         unsafe {
             self.write(cmd, stage, 1);
             // Begun with the same condition, except for names with a zero byte, whose label is missing.
-            if let (Some(debug), Ok(_)) = (&self.gpu.debug, CString::new(self.names[stage as usize].as_str()))
-            {
+            if let (Some(debug), Ok(_)) = (&self.gpu.debug, CString::new(self.stages[stage as usize].name)) {
                 debug.cmd_end_debug_utils_label(cmd);
             }
         }
@@ -87,7 +183,7 @@ impl Stages {
     pub fn check_closed(&self) -> Result<()> {
         self.open.last().map_or(Ok(()), |stage| {
             Err(Error::Config {
-                what: format!("stage {}", self.names[*stage as usize]),
+                what: format!("stage {}", self.stages[*stage as usize].name),
                 problem: "has no end_stage".into(),
             })
         })
@@ -96,8 +192,8 @@ impl Stages {
     /// Times of all stages, or `None` while the device has not finished.
     pub fn read(&self) -> Result<Option<Timings>> {
         let mut timings = Timings::new();
-        for (pool, names) in self.pools.iter().zip(self.names.chunks(STAGES_PER_POOL as usize)) {
-            let mut ticks = vec![[0u64; 2]; names.len()];
+        for (pool, stages) in self.pools.iter().zip(self.stages.chunks(STAGES_PER_POOL as usize)) {
+            let mut ticks = vec![[0u64; 2]; stages.len()];
             // SAFETY: the pool is alive, and as many queries as asked for were written.
             let result = unsafe {
                 self.gpu.device.get_query_pool_results(
@@ -109,10 +205,10 @@ impl Stages {
             };
             match result {
                 Err(vk::Result::NOT_READY) => return Ok(None),
-                other => other.map_err(vulkan("vkGetQueryPoolResults", &names[0]))?,
+                other => other.map_err(vulkan("vkGetQueryPoolResults", stages[0].name))?,
             }
-            for (name, [begin, end]) in names.iter().zip(ticks) {
-                timings.push((name.clone(), self.milliseconds(begin, end)));
+            for (stage, [begin, end]) in stages.iter().zip(ticks) {
+                timings.push(*stage, self.milliseconds(begin, end));
             }
         }
         Ok(Some(timings))

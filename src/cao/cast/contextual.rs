@@ -2,78 +2,93 @@
 //! changed. The list holds the bricks that changed now, and those that changed at the last update, which return to V_PAO;
 //! V_AO is updated in place, and no other brick is touched.
 
-use super::parts;
-use super::volumes::{Kernels, Settings, Volumes};
-use crate::cast::lao::{Bindings, Work};
-use crate::field::Field;
+use super::full::recompute;
+use super::lao::{Bindings, Work};
+use super::volumes::{Kernels, Volumes};
+use super::{classified, local, over_bricks, unclipped};
+use crate::Result;
+use crate::drive::Part;
 use crate::field::bricks::Which;
-use cao_gpu::Result;
-use cao_gpu::{Access, Gpu, Recorder, Timings};
+use crate::host::volume_image;
+use crate::method::{Ambient, Categories, Changed, Fields, Recomputation};
+use crate::stages;
+use crate::subject::Subject;
+use cao_gpu::{Access, Format, Image, Timings};
 
-/// Records the update of V_AO from V_PAO, V_o and V_m into a command buffer, as one dispatch.
-pub fn record(
-    rec: &mut Recorder,
-    field: &Field,
-    kernels: &Kernels,
-    volumes: &Volumes,
-    settings: &Settings,
-) -> Result<()> {
-    list(rec, field, kernels, volumes)?;
-
-    rec.stage("contextual")?;
-    kernels.lao.record(
-        rec,
-        field,
-        &settings.occlusion,
-        settings.reference_mm,
-        settings.scope,
-        Work::ByMask,
-        bindings(volumes),
-    )?;
-    rec.end_stage()?;
-    rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead]);
-    Ok(())
+/// The method `cao`.
+pub struct Contextual {
+    kernels: Kernels,
+    volumes: Volumes,
+    /// V_PAO: ambient factor without clips, r32float.
+    precomputed: Image,
 }
 
-/// The same on the device's own queue, in parts, telling `progress` the share done (0 … 1). Waits for the end.
-pub fn run(
-    gpu: &Gpu,
-    field: &Field,
-    kernels: &Kernels,
-    volumes: &Volumes,
-    settings: &Settings,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Timings> {
-    let mut rec = gpu.recorder("contextual bricks")?;
-    list(&mut rec, field, kernels, volumes)?;
-    let mut timings = rec.submit_and_wait()?;
-    let b = bindings(volumes);
-    timings.push(parts::run(gpu, "contextual", field, kernels, settings, Work::ByMask, b, progress)?);
-    Ok(timings)
+impl Contextual {
+    /// Volumes and pipelines for a subject. Uses the device's queue and waits for it.
+    pub fn new(on: &Subject) -> Result<Self> {
+        let precomputed = volume_image(&on.gpu, "precomputed ambient", &on.field, Format::R32Float)?;
+        let mut rec = on.gpu.recorder("clear volumes")?;
+        rec.discard(&precomputed);
+        rec.submit_and_wait()?;
+        Ok(Self { kernels: Kernels::new(&on.gpu)?, volumes: Volumes::new(&on.gpu, &on.field)?, precomputed })
+    }
+
+    /// V_PAO, after which every brick of V_AO is out of date.
+    fn precompute<'a>(&'a self, on: &'a Subject) -> [Part<'a>; 3] {
+        let (k, v) = (&self.kernels, &self.volumes);
+        let two = [stages::PRECOMPUTE_BRICKS, stages::PRECOMPUTE];
+        let [bricks, rays] = local(k, v, on, (&v.full_opacity, &self.precomputed), two);
+        let outdated = Part::short(stages::PRECOMPUTE, |rec| {
+            rec.barrier(&[Access::StorageRead], &[Access::TransferWrite]);
+            rec.fill(&v.changed_before, 0, v.changed_before.bytes(), 1)?;
+            rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+            Ok(())
+        });
+        [bricks, rays, outdated]
+    }
 }
 
-fn list(rec: &mut Recorder, field: &Field, kernels: &Kernels, volumes: &Volumes) -> Result<()> {
-    rec.stage("bricks")?;
-    kernels.bricks.record(
-        rec,
-        field,
-        Which::Changed,
-        &volumes.opacity,
-        &volumes.mask,
-        &volumes.changed_before,
-        &volumes.list,
-    )?;
-    rec.end_stage()?;
-    rec.barrier(&[Access::SampledRead, Access::GraphicsRead, Access::TransferRead], &[Access::StorageWrite]);
-    Ok(())
-}
+impl Ambient for Contextual {
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+        let (k, v) = (&self.kernels, &self.volumes);
+        let mut parts = unclipped(k, v, on, changed);
+        if changed.opacities || changed.anew {
+            parts.extend(self.precompute(on));
+        }
+        parts.push(classified(k, v, on));
+        parts.push(Part::short(stages::BRICKS, |rec| {
+            let (which, mask, before) = (Which::Changed, &v.mask, &v.changed_before);
+            Ok(k.bricks.record(rec, &on.field, which, &v.opacity, mask, before, &v.list)?)
+        }));
+        let bindings = Bindings {
+            opacity: &v.opacity,
+            list: &v.list,
+            mask: &v.mask,
+            precomputed: &self.precomputed,
+            ambient: &v.ambient,
+        };
+        parts.push(over_bricks(k, on, stages::CONTEXTUAL, Work::ByMask, bindings));
+        parts
+    }
 
-fn bindings(volumes: &Volumes) -> Bindings<'_> {
-    Bindings {
-        opacity: &volumes.opacity,
-        list: &volumes.list,
-        mask: &volumes.mask,
-        precomputed: &volumes.precomputed,
-        ambient: &volumes.ambient,
+    fn fields(&self) -> Fields<'_> {
+        self.volumes.fields()
+    }
+
+    fn recompute(
+        &self,
+        on: &Subject,
+        into: &Image,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Recomputation<'_>, Timings)> {
+        recompute(&self.kernels, &self.volumes, on, into, progress)
+    }
+
+    fn mask(&self, on: &Subject) -> Result<Vec<u8>> {
+        self.volumes.mask(on)
+    }
+
+    fn categories(&self, on: &Subject) -> Result<Categories> {
+        self.kernels.categories(on)
     }
 }

@@ -1,105 +1,70 @@
-//! Local ambient occlusion of a whole volume (CAO §3.4 step 1): list the bricks, cast the rays.
+//! Local ambient occlusion of the clipped volume (CAO §3.4 step 1), every voxel at every change.
 
-use super::parts;
-use super::volumes::{Kernels, Settings, Volumes};
-use crate::cast::lao::{Bindings, Work};
-use crate::field::Field;
-use crate::field::bricks::Which;
-use cao_gpu::Result;
-use cao_gpu::{Access, Gpu, Image, Recorder, Timings};
-use cao_model::settings::Scope;
+use super::volumes::{Kernels, Volumes};
+use super::{classified, local, unclipped};
+use crate::Result;
+use crate::drive::{self, Part};
+use crate::field::bricks::BrickList;
+use crate::method::{Ambient, Categories, Changed, Fields, Recomputation};
+use crate::stages;
+use crate::subject::Subject;
+use crate::verify::compare::Recomputed;
+use cao_gpu::{Image, Timings};
 
-/// Records the computation of `ambient` from `opacity` into a command buffer, as one dispatch.
-pub fn record(
-    rec: &mut Recorder,
-    field: &Field,
-    kernels: &Kernels,
-    volumes: &Volumes,
-    settings: &Settings,
-    opacity: &Image,
-    ambient: &Image,
-) -> Result<()> {
-    list(rec, field, kernels, volumes, settings, opacity, ambient)?;
-
-    rec.stage("lao")?;
-    let b = bindings(volumes, opacity, ambient);
-    kernels.lao.record(
-        rec,
-        field,
-        &settings.occlusion,
-        settings.reference_mm,
-        settings.scope,
-        Work::Full,
-        b,
-    )?;
-    rec.end_stage()?;
-    rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::GraphicsRead, Access::TransferRead]);
-    Ok(())
+/// The method `lao`.
+pub struct Full {
+    kernels: Kernels,
+    volumes: Volumes,
 }
 
-/// The same on the device's own queue, in parts, telling `progress` the share done (0 … 1). Waits for the end.
-#[expect(clippy::too_many_arguments, reason = "inputs, outputs and settings, each named once")]
-pub fn run(
-    gpu: &Gpu,
-    field: &Field,
-    kernels: &Kernels,
-    volumes: &Volumes,
-    settings: &Settings,
-    opacity: &Image,
-    ambient: &Image,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Timings> {
-    let mut rec = gpu.recorder("lao bricks")?;
-    list(&mut rec, field, kernels, volumes, settings, opacity, ambient)?;
-    let mut timings = rec.submit_and_wait()?;
-    let b = bindings(volumes, opacity, ambient);
-    timings.push(parts::run(gpu, "lao", field, kernels, settings, Work::Full, b, progress)?);
-    Ok(timings)
-}
-
-fn list(
-    rec: &mut Recorder,
-    field: &Field,
-    kernels: &Kernels,
-    volumes: &Volumes,
-    settings: &Settings,
-    opacity: &Image,
-    ambient: &Image,
-) -> Result<()> {
-    rec.barrier(
-        &[Access::SampledRead, Access::GraphicsRead, Access::StorageWrite, Access::TransferRead],
-        &[Access::TransferWrite],
-    );
-    rec.clear_image(ambient, [1.0; 4])?;
-    rec.barrier(
-        &[Access::TransferWrite, Access::StorageWrite],
-        &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
-    );
-    rec.stage("bricks")?;
-    let which = match settings.scope {
-        Scope::All => Which::All,
-        Scope::Needed => Which::Needed,
-    };
-    kernels.bricks.record(
-        rec,
-        field,
-        which,
-        opacity,
-        &volumes.mask,
-        &volumes.changed_before,
-        &volumes.list,
-    )?;
-    rec.end_stage()?;
-    Ok(())
-}
-
-fn bindings<'a>(volumes: &'a Volumes, opacity: &'a Image, ambient: &'a Image) -> Bindings<'a> {
-    // The mask and a precomputed volume are bound but not read by a full computation; V_PAO may be its output.
-    Bindings {
-        opacity,
-        list: &volumes.list,
-        mask: &volumes.mask,
-        precomputed: &volumes.full_opacity,
-        ambient,
+impl Full {
+    /// Volumes and pipelines for a subject. Uses the device's queue and waits for it.
+    pub fn new(on: &Subject) -> Result<Self> {
+        Ok(Self { kernels: Kernels::new(&on.gpu)?, volumes: Volumes::new(&on.gpu, &on.field)? })
     }
+}
+
+impl Ambient for Full {
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+        let (k, v) = (&self.kernels, &self.volumes);
+        let mut parts = unclipped(k, v, on, changed);
+        parts.push(classified(k, v, on));
+        parts.extend(local(k, v, on, (&v.opacity, &v.ambient), [stages::BRICKS, stages::LAO]));
+        parts
+    }
+
+    fn fields(&self) -> Fields<'_> {
+        self.volumes.fields()
+    }
+
+    fn recompute(
+        &self,
+        on: &Subject,
+        into: &Image,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Recomputation<'_>, Timings)> {
+        recompute(&self.kernels, &self.volumes, on, into, progress)
+    }
+
+    fn mask(&self, on: &Subject) -> Result<Vec<u8>> {
+        self.volumes.mask(on)
+    }
+
+    fn categories(&self, on: &Subject) -> Result<Categories> {
+        self.kernels.categories(on)
+    }
+}
+
+/// Every value from V_o as it is.
+pub(super) fn recompute<'a>(
+    k: &Kernels,
+    v: &'a Volumes,
+    on: &Subject,
+    into: &Image,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Recomputation<'a>, Timings)> {
+    let parts = local(k, v, on, (&v.opacity, into), [stages::BRICKS, stages::LAO]);
+    let timings = drive::run(&on.gpu, &parts, progress)?;
+    let list = BrickList { buffer: v.list.buffer.clone() };
+    Ok((Recomputation { list, recomputed: Recomputed::Mask(&v.mask) }, timings))
 }

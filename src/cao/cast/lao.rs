@@ -135,7 +135,7 @@ impl Lao {
         count: u32,
     ) -> Result<()> {
         let params = params(field, occlusion, reference_mm, scope, work, base);
-        let groups = crate::stage::row_of_groups(count);
+        let groups = crate::host::row_of_groups(count);
         rec.dispatch(&self.pipeline, &self.binds(bindings), bytemuck::bytes_of(&params), groups)
     }
 

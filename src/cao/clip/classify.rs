@@ -7,7 +7,7 @@
 
 use crate::clip::clips::ClipSet;
 use crate::field::Field;
-use crate::stage::device_buffer;
+use crate::host::device_buffer;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;

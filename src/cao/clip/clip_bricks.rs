@@ -8,7 +8,7 @@
 
 use crate::clip::clips::ClipSet;
 use crate::field::Field;
-use crate::stage::row_of_groups;
+use crate::host::row_of_groups;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;

@@ -6,6 +6,7 @@
 
 use crate::clip::dilate::Dilate;
 use crate::clip::peel::{Layers, Peel};
+use crate::stages;
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::layout_check;
@@ -169,7 +170,7 @@ impl ClipSet {
                     let solid = mesh.outward()?;
                     let camera = ClipCamera::around(&solid, scale, margin, settings.resolution);
                     let layers = peel.run(gpu, &solid, scale, camera, settings.pairs)?;
-                    timings.push(("peel".into(), layers.milliseconds));
+                    timings.push(stages::PEEL, layers.milliseconds);
                     Peeled { mesh: mesh.clone(), scale, margin, settings, layers }
                 }
             });
@@ -201,7 +202,7 @@ impl ClipSet {
             mesh.blocks_at = all.len() as u32;
             all.extend(block_bounds(&have.layers.depth, settings.resolution as usize));
         }
-        self.layers = crate::stage::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
+        self.layers = crate::host::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
         self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
         let most = meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
@@ -211,7 +212,7 @@ impl ClipSet {
                 &[Access::StorageRead, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite],
             );
-            rec.stage("dilate")?;
+            rec.stage(stages::DILATE)?;
             dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
             rec.end_stage()?;
         }

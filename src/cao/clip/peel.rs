@@ -6,6 +6,7 @@
 //! Cost: 2·P + 2 rasterizations of the mesh, once for each mesh, scale and margin.
 
 use crate::Result;
+use crate::stages;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::layout_check;
 use cao_gpu::{
@@ -119,7 +120,7 @@ impl Peel {
                 }
                 rec.discard(&now);
                 rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead]);
-                rec.stage("peel")?;
+                rec.stage(stages::PEEL)?;
                 rec.draw(
                     pipeline,
                     &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
@@ -136,7 +137,7 @@ impl Peel {
                 rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
                 rec.copy_image_to_buffer(&now, 0, [0; 3], [edge, edge, 1], &read_back, 0)?;
                 rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-                milliseconds += rec.submit_and_wait()?.iter().map(|(_, ms)| ms).sum::<f64>();
+                milliseconds += rec.submit_and_wait()?.total();
                 let map: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
                 if map.iter().all(|&z| z >= 1.0) {
                     break;

@@ -7,7 +7,7 @@
 //! is none), 24 … 31 a bit for each clip that hides any of what a ray reads in the brick. Cost: bricks × the distances found.
 
 use crate::field::Field;
-use crate::stage::row_of_groups;
+use crate::host::row_of_groups;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;

@@ -5,7 +5,7 @@
 //! two reads a voxel.
 
 use crate::field::Field;
-use crate::stage::{device_buffer, row_of_groups};
+use crate::host::{device_buffer, row_of_groups};
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;

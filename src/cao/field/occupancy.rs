@@ -5,7 +5,7 @@
 
 use crate::field::Field;
 use crate::field::transfer::TransferBuffer;
-use crate::stage::row_of_groups;
+use crate::host::row_of_groups;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;

@@ -11,7 +11,7 @@ use crate::clip::clips::ClipSet;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use crate::field::transfer::TransferBuffer;
-use crate::stage::row_of_groups;
+use crate::host::row_of_groups;
 use crate::sweep::past::PastBricks;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;

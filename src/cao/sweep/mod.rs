@@ -1,8 +1,8 @@
 //! Line sweeps with contextual updates from change.
 
 pub mod carve;
-pub mod method;
 pub mod near;
 pub mod past;
 pub mod sweep;
 pub mod sweep_list;
+pub mod swept;

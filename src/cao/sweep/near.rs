@@ -3,11 +3,11 @@
 //!
 //! In and out: `change` (f32 a brick: squared distance, 0 where changed, [`FAR`] elsewhere; holds [`FAR`] again afterwards).
 //! In: `contact` and `past` of [`super::carve`]. In and out: `valued`. Out: `todo` (a u32 a brick: to do or not; anew where there is no
-//! value yet or more changed than `past` holds, amended elsewhere; changed itself), their number `count`, and `solid`. Cost: a few
+//! value yet or more changed than `past` holds, amended elsewhere; changed itself), what was chosen in all, `chosen`, and `solid`. Cost: a few
 //! reads a brick and axis.
 
 use crate::field::Field;
-use crate::stage::row_of_groups;
+use crate::host::row_of_groups;
 use crate::sweep::past::PastBricks;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
@@ -50,7 +50,7 @@ pub struct Chosen {
     /// Greatest place of the same.
     pub high: [u32; 6],
 }
-layout_check!(Chosen => shaders::near::COUNT { bricks, low, high });
+layout_check!(Chosen => shaders::near::CHOSEN { bricks, low, high });
 
 impl Chosen {
     const NONE: Self = Self { bricks: 0, low: [u32::MAX; 6], high: [0; 6] };
@@ -71,7 +71,7 @@ pub struct Bindings<'a> {
     /// [`TODO`], [`ANEW`], [`CHANGED`] of each brick, u32 each; the latter are read.
     pub todo: &'a Buffer,
     /// [`Chosen`].
-    pub count: &'a Buffer,
+    pub chosen: &'a Buffer,
     /// Where there is opacity, u32 a brick: bit sx + 2 sy + 4 sz for the bricks at (0 … sx, 0 … sy, 0 … sz) from it.
     pub solid: &'a Buffer,
     /// Bricks that have values, u32 each.
@@ -117,7 +117,7 @@ impl Near {
         let between = [Access::StorageRead, Access::StorageWrite];
         let (mut before, mut after) = (b.change, b.other);
         rec.barrier(&[Access::TransferRead, Access::StorageRead], &[Access::TransferWrite]);
-        rec.update(b.count, 0, bytemuck::bytes_of(&Chosen::NONE))?;
+        rec.update(b.chosen, 0, bytemuck::bytes_of(&Chosen::NONE))?;
         rec.barrier(&[Access::TransferWrite], &between);
         for axis in 0..3 {
             params.axis = axis;
@@ -130,7 +130,7 @@ impl Near {
             ("before", Bind::Buffer(before)),
             ("contact", Bind::Buffer(b.contact)),
             ("todo", Bind::Buffer(b.todo)),
-            ("count", Bind::Buffer(b.count)),
+            ("chosen", Bind::Buffer(b.chosen)),
             ("solid", Bind::Buffer(b.solid)),
             ("valued", Bind::Buffer(b.valued)),
             ("changed", Bind::Buffer(&b.past.list.buffer)),

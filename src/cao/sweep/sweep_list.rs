@@ -5,7 +5,7 @@
 //! In: `todo` (a u32 a brick). Out: `list`. Cost: a few reads a brick and direction.
 
 use crate::field::Field;
-use crate::stage::device_buffer;
+use crate::host::device_buffer;
 use crate::sweep::sweep::SweepPlan;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
@@ -46,7 +46,7 @@ struct Head {
     at: u32,
 }
 layout_check!(Head => shaders::sweep_list::COUNTED_HEAD { groups_x, groups_y, groups_z, count, at });
-layout_check!(super::near::Chosen => shaders::sweep_list::BOUNDS { bricks, low, high });
+layout_check!(super::near::Chosen => shaders::sweep_list::CHOSEN { bricks, low, high });
 layout_check!(Head => shaders::sweep::SWEEP_HEAD { groups_x, groups_y, groups_z, count, at });
 
 /// Bytes of the head of one direction, which are first in the list; each begins with the arguments of an indirect dispatch.
@@ -144,7 +144,7 @@ impl SweepList {
             ("directions", Bind::Buffer(&b.lists.directions)),
             ("todo", Bind::Buffer(b.todo)),
             ("list", Bind::Buffer(&b.lists.list)),
-            ("bounds", Bind::Buffer(b.chosen)),
+            ("chosen", Bind::Buffer(b.chosen)),
         ];
         rec.dispatch_over(
             &self.pipeline,

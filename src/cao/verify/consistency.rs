@@ -4,12 +4,15 @@
 //! image) and the ambient factor that the ray cast reads there. Cost: one ray a point and eye.
 
 use crate::draw::eyes::FrameBuffer;
-use crate::stage::device_buffer;
+use crate::host::device_buffer;
+use crate::renderer::Renderer;
 use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
 use cao_gpu::layout_check;
 use cao_gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
 use cao_kernels as shaders;
+use cao_model::look::Look;
+use cao_model::view::View;
 use glam::Vec3;
 
 #[repr(C)]
@@ -81,4 +84,21 @@ impl Consistency {
         rec.submit_and_wait()?;
         Ok(bytemuck::pod_collect_to_vec(&read_back.read(0, bytes)?))
     }
+}
+
+/// What the left and the right eye read at world points in mm, in the order given. Refuses while the ambient volume is out of date.
+/// Uses the device's queue and waits for it.
+pub fn seen_by_both(
+    renderer: &Renderer,
+    views: &[View; 2],
+    look: &Look,
+    points: &[Vec3],
+) -> crate::Result<Vec<[Seen; 2]>> {
+    renderer.current()?;
+    let (subject, fields) = (renderer.subject(), renderer.ambient().fields());
+    let mut rec = subject.gpu.recorder("frame")?;
+    renderer.frame().record(&mut rec, &subject.field, views, look, subject.reference_mm())?;
+    rec.submit_and_wait()?;
+    let consistency = Consistency::new(&subject.gpu)?;
+    Ok(consistency.run(&subject.gpu, renderer.frame(), fields.opacity, fields.ambient, points)?)
 }

@@ -1,11 +1,12 @@
 //! Cast rays of other settings in a few bricks of a scene, and take their time: what a planner measures (measure.md §5).
 
 use crate::cast::lao::{Bindings, Lao, Work};
-use crate::cast::volumes::volume_image;
 use crate::field::bricks::BrickList;
 use crate::field::{BRICK, Field};
+use crate::host::{read_values, volume_image};
+use crate::renderer::Renderer;
 use cao_gpu::Result;
-use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage};
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::Scope;
 use std::time::Instant;
@@ -18,6 +19,18 @@ const LONG_ENOUGH_MS: f64 = 10.0;
 
 /// Most times that a brick stands in a list to make it longer.
 const MOST_REPEATS: usize = 64;
+
+const PROBE: Stage = Stage::new("probe", Phase::Ambient);
+
+/// Brings V_o up to date and lends it to trials of other rays; also returns it, x fastest. V_AO goes out of date: the next
+/// update computes everything. Uses the device's queue and waits for it.
+pub fn probe(renderer: &mut Renderer) -> crate::Result<(Probe<'_>, Vec<f32>)> {
+    renderer.update_opacity()?;
+    let (subject, opacity) = (renderer.subject(), renderer.ambient().fields().opacity);
+    let values = read_values(&subject.gpu, opacity)?;
+    let (scope, reference_mm) = (subject.setup.scope, subject.reference_mm());
+    Ok((Probe::new(&subject.gpu, &subject.field, opacity, scope, reference_mm)?, values))
+}
 
 /// A scene to try settings on.
 pub struct Probe<'a> {
@@ -104,7 +117,7 @@ impl<'a> Probe<'a> {
                 &[Access::TransferWrite, Access::TransferRead, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite, Access::SampledRead],
             );
-            rec.stage("probe")?;
+            rec.stage(PROBE)?;
             let (field, work, count) = (self.field, Work::Full, bricks.len() as u32);
             let (reference_mm, scope) = (self.reference_mm, self.scope);
             self.lao.record_part(
@@ -121,7 +134,7 @@ impl<'a> Probe<'a> {
             rec.end_stage()?;
         }
         let start = Instant::now();
-        let mut times: Vec<f64> = rec.submit_and_wait()?.into_iter().map(|(_, ms)| ms).collect();
+        let mut times: Vec<f64> = rec.submit_and_wait()?.into_iter().map(|timing| timing.ms).collect();
         times.sort_by(f64::total_cmp);
         // Queues without timestamps leave the program's clock.
         let by_clock = start.elapsed().as_secs_f64() * 1e3 / runs as f64;

@@ -7,7 +7,7 @@
 use crate::{Error, Result};
 use bytemuck::{Pod, Zeroable};
 use cao::field::Field;
-use cao::stage::{device_buffer, row_of_groups};
+use cao::host::{device_buffer, row_of_groups};
 use cao_gpu::layout_check;
 use cao_gpu::{
     Access, Bind, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse,

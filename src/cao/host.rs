@@ -1,0 +1,74 @@
+//! What the host sides of kernels share.
+
+use crate::field::Field;
+use cao_gpu::Result;
+use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+
+/// Device memory with this content. Uses the device's queue and waits for it.
+pub fn device_buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Result<Buffer> {
+    let bytes = content.len() as u64;
+    let staging = gpu.buffer("staging", bytes, BufferUse::Upload)?;
+    staging.write(0, content)?;
+    let buffer = gpu.buffer(name, bytes, BufferUse::Device)?;
+    let mut rec = gpu.recorder("upload")?;
+    rec.barrier(&[], &[Access::TransferRead, Access::TransferWrite]);
+    rec.copy_buffer(&staging, 0, &buffer, 0, bytes)?;
+    rec.submit_and_wait()?;
+    Ok(buffer)
+}
+
+/// Group counts for `n` workgroups when one axis may not hold them all; kernels drop the surplus.
+pub fn row_of_groups(n: u32) -> [u32; 3] {
+    const ROW: u32 = 65535;
+    [n.min(ROW), n.div_ceil(ROW), 1]
+}
+
+/// A 3D image of the field's size that kernels sample and store to.
+pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Result<Image> {
+    let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
+    gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
+}
+
+/// Texels of a volume, x fastest; slices at a time, a sixteenth of it, so that reading takes little memory. Uses the device's queue and
+/// waits for it.
+pub fn read_texels(gpu: &Gpu, image: &Image) -> Result<Vec<u8>> {
+    let [x, y, z] = image.desc().dims;
+    let slice = u64::from(x) * u64::from(y) * image.desc().format.bytes();
+    let slices = ((64 << 20) / slice).clamp(1, u64::from(z.div_ceil(16))) as u32;
+    let read_back = gpu.buffer("volume read-back", slice * u64::from(slices), BufferUse::Readback)?;
+    let mut all = Vec::with_capacity((slice * u64::from(z)) as usize);
+    let mut first = 0;
+    while first < z {
+        let count = slices.min(z - first);
+        let mut rec = gpu.recorder("read volume")?;
+        rec.copy_image_to_buffer(image, 0, [0, 0, first], [x, y, count], &read_back, 0)?;
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait()?;
+        all.extend(read_back.read(0, slice * u64::from(count))?);
+        first += count;
+    }
+    Ok(all)
+}
+
+/// What the texels of an r32float or r16unorm volume stand for, x fastest. Uses the device's queue and waits for it.
+pub fn read_values(gpu: &Gpu, image: &Image) -> Result<Vec<f32>> {
+    let texels = read_texels(gpu, image)?;
+    Ok(match image.desc().format {
+        Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&texels)
+            .into_iter()
+            .map(|texel| f32::from(texel) / 65535.0)
+            .collect(),
+        _ => bytemuck::pod_collect_to_vec(&texels),
+    })
+}
+
+/// Content of a buffer. Uses the device's queue and waits for it.
+pub fn read_buffer(gpu: &Gpu, buffer: &Buffer) -> Result<Vec<u8>> {
+    let read_back = gpu.buffer("read-back", buffer.bytes(), BufferUse::Readback)?;
+    let mut rec = gpu.recorder("read buffer")?;
+    rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+    rec.copy_buffer(buffer, 0, &read_back, 0, buffer.bytes())?;
+    rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+    rec.submit_and_wait()?;
+    read_back.read(0, buffer.bytes())
+}

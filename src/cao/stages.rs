@@ -1,0 +1,38 @@
+//! Every stage of a frame, by the phase that it belongs to.
+
+use cao_gpu::{Phase, Stage};
+
+/// Depth layers of a clip mesh.
+pub const PEEL: Stage = Stage::new("peel", Phase::Prepare);
+/// Dilation maps of a clip mesh.
+pub const DILATE: Stage = Stage::new("dilate", Phase::Prepare);
+/// The table of rays.
+pub const RAYS: Stage = Stage::new("rays", Phase::Prepare);
+/// The bricks of V_PAO.
+pub const PRECOMPUTE_BRICKS: Stage = Stage::new("precompute bricks", Phase::Prepare);
+/// V_PAO.
+pub const PRECOMPUTE: Stage = Stage::new("precompute lao", Phase::Prepare);
+/// Which bricks can have opacity.
+pub const OCCUPANCY: Stage = Stage::new("occupancy", Phase::Opacity);
+/// V_o before clipping.
+pub const OPACITY: Stage = Stage::new("opacity", Phase::Opacity);
+/// V_o after clipping, and the category of every voxel.
+pub const CLASSIFY: Stage = Stage::new("classify", Phase::Clip);
+/// V_o in place, and what changed.
+pub const CARVE: Stage = Stage::new("carve", Phase::Clip);
+/// The bricks to work on.
+pub const BRICKS: Stage = Stage::new("bricks", Phase::Ambient);
+/// Rays of all voxels.
+pub const LAO: Stage = Stage::new("lao", Phase::Ambient);
+/// Rays of the voxels that a clip affects.
+pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
+/// The bricks to amend and to compute anew.
+pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
+/// Rays that meet a change, taken back and walked again.
+pub const AMEND: Stage = Stage::new("amend", Phase::Ambient);
+/// Lines of bricks that are computed anew.
+pub const SWEEP: Stage = Stage::new("sweep", Phase::Ambient);
+/// How far rays of the picture may leap.
+pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
+/// The picture.
+pub const RAYCAST: Stage = Stage::new("raycast", Phase::Draw);
