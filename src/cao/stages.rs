@@ -3,9 +3,9 @@
 use cao_gpu::{Phase, Stage};
 
 /// Depth layers of a clip mesh.
-pub const PEEL: Stage = Stage::new("peel", Phase::Prepare);
+pub const PEEL: Stage = Stage::new("peel", Phase::Clip);
 /// Dilation maps of a clip mesh.
-pub const DILATE: Stage = Stage::new("dilate", Phase::Prepare);
+pub const DILATE: Stage = Stage::new("dilate", Phase::Clip);
 /// The table of rays.
 pub const RAYS: Stage = Stage::new("rays", Phase::Prepare);
 /// The bricks of V_PAO.

@@ -2,8 +2,8 @@
 
 use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
-use cao::renderer::Categories;
-use cao_gpu::{Gpu, OpenOptions};
+use cao::method::Categories;
+use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::lattice::LatticeRays;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
@@ -149,11 +149,11 @@ impl Out {
     }
 
     /// Times of the stages, in both forms.
-    pub fn timings(&mut self, timings: &[(String, f64)]) {
+    pub fn timings(&mut self, timings: &Timings) {
         let mut stages = Map::new();
-        for (stage, ms) in timings {
-            self.line(format!("  {stage:<20} {ms:>10.3} ms"));
-            stages.insert(stage.clone(), (*ms).into());
+        for timing in timings {
+            self.line(format!("  {:<20} {:>10.3} ms", timing.stage.name, timing.ms));
+            stages.insert(timing.stage.name.into(), timing.ms.into());
         }
         self.json(json!({ "stages_ms": stages }));
     }

@@ -11,7 +11,7 @@ use std::{ffi::CString, sync::Arc};
 /// What a stage is for, in the order of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Phase {
-    /// Made once for many frames: maps of clip meshes, tables.
+    /// Made once for many frames.
     Prepare,
     /// Values to opacities.
     Opacity,
@@ -84,6 +84,15 @@ impl std::ops::Deref for Timings {
 
     fn deref(&self) -> &[Timing] {
         &self.0
+    }
+}
+
+impl<'a> IntoIterator for &'a Timings {
+    type Item = &'a Timing;
+    type IntoIter = std::slice::Iter<'a, Timing>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
     }
 }
 

@@ -3,9 +3,10 @@
 
 use super::random::Random;
 use crate::Result;
-use cao::renderer::{Categories, Renderer};
+use cao::method::Categories;
+use cao::renderer::Renderer;
 use cao::verify::compare::Difference;
-use cao_gpu::Timings;
+use cao_gpu::{Phase, Timings};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::view::{StereoRig, View};
@@ -71,7 +72,7 @@ impl Report {
     /// Median over the trials of full time / contextual time.
     pub fn speedup(&self) -> f64 {
         let mut ratios: Vec<f64> =
-            self.trials.iter().map(|t| sum(&t.full) / sum(&t.contextual).max(1e-6)).collect();
+            self.trials.iter().map(|t| t.full.total() / t.contextual.total().max(1e-6)).collect();
         ratios.sort_by(f64::total_cmp);
         ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
     }
@@ -116,9 +117,9 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
             let done = f64::from(report.trials.len() as u32);
             let contextual = renderer.update(&mut |_| ())?;
             let (difference, full) =
-                renderer.verify(&mut |part| progress((done + part) / f64::from(total)))?;
+                cao::verify::verify(renderer, &mut |part| progress((done + part) / f64::from(total)))?;
             // The first update also computes V_PAO, which belongs to neither.
-            let contextual = contextual.into_iter().filter(|(stage, _)| !stage.starts_with("precompute"));
+            let contextual = contextual.into_iter().filter(|timing| timing.stage.phase != Phase::Prepare);
             report.trials.push(Trial {
                 clip,
                 difference,
@@ -136,10 +137,6 @@ pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64
         }
     }
     Ok(report)
-}
-
-fn sum(timings: &Timings) -> f64 {
-    timings.iter().map(|(_, ms)| ms).sum()
 }
 
 /// A random pose of a shape: in turn ordinary, across the border, tiny, covering everything, outside; either side hidden.
@@ -208,7 +205,7 @@ pub fn compare_views(renderer: &Renderer, views: &[View; 2], random: &mut Random
         }
     }
     let mut stereo = Stereo::default();
-    for [left, right] in renderer.seen_by_both(views, &Look::default(), &points)? {
+    for [left, right] in cao::verify::seen_by_both(renderer, views, &Look::default(), &points)? {
         if left.transmittance >= SEEN && right.transmittance >= SEEN {
             stereo.points += 1;
             if left.ambient.to_bits() != right.ambient.to_bits() {

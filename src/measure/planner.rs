@@ -19,7 +19,7 @@ use crate::{Error, Result};
 use cao::field::BRICK;
 use cao::renderer::Renderer;
 use cao::verify::probe::Probe;
-use cao_gpu::Gpu;
+use cao_gpu::{Gpu, Phase};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::Scope;
@@ -243,7 +243,7 @@ fn swept(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
     for _ in 0..3 {
         renderer.invalidate();
         let timings = renderer.update(&mut |_| ())?;
-        times.push(timings.iter().filter(|(stage, _)| stage == "sweep").map(|(_, ms)| ms).sum::<f64>());
+        times.push(timings.of(Phase::Ambient));
         if times[0] > LONG_ENOUGH_MS {
             break;
         }
@@ -345,7 +345,7 @@ impl<'a> Scene<'a> {
         let gpu = renderer.gpu().clone();
         let field = renderer.field();
         let grid = Grid { dims: field.dims.map(|d| d as usize), spacing: field.spacing.map(f64::from) };
-        let (trial, opacity) = renderer.probe()?;
+        let (trial, opacity) = cao::verify::probe(renderer)?;
         Ok(Self { gpu, grid, opacity, trial })
     }
 

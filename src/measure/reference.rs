@@ -9,7 +9,7 @@ use super::error::{Errors, counting, errors};
 use super::random::Random;
 use crate::kernels::reference::{Points, Reference as Kernel, upload_clearance};
 use crate::{Error, Result};
-use cao::cast::parts::in_parts;
+use cao::drive::in_parts;
 use cao::field::Field;
 use cao::gpu;
 use cao_gpu::Gpu;
@@ -19,6 +19,8 @@ use cao_model::view::View;
 use cao_model::volume::Volume;
 use cao_twin::Grid;
 use cao_twin::draw::raycast::{Frame, Image, ambient_positions, raycast_lit};
+
+const REFERENCE: gpu::Stage = gpu::Stage::new("reference", gpu::Phase::Ambient);
 
 /// How well a reference is to converge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -358,10 +360,11 @@ impl<'a> Scene<'a> {
         let samples = f64::from(integral.directions) * f64::from(integral.samples.max(1));
         let first = (4e6 / samples).clamp(1.0, 1e6) as u32;
         let (field, clearance) = (&self.field, &self.clearance);
-        let mut record = |rec: &mut gpu::Recorder, base: u32, now: u32| {
-            self.kernel.record(rec, field, clearance, integral, reference_mm, &points, base, now)
+        let mut record = |rec: &mut gpu::Recorder, items: std::ops::Range<u32>| {
+            let (base, now) = (items.start, items.len() as u32);
+            Ok(self.kernel.record(rec, field, clearance, integral, reference_mm, &points, base, now)?)
         };
-        let ms = in_parts(self.gpu, "reference", points.count, first, &mut record, progress)?;
+        let ms = in_parts(self.gpu, REFERENCE, points.count, first, &mut record, progress)?;
         Ok((points.read(self.gpu)?, ms))
     }
 }

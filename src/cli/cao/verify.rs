@@ -3,6 +3,7 @@
 use crate::args::{self, Global, Verify, setup};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
+use cao::gpu::Timings;
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_measure::exactness::{Plan, Report, verify};
 use cao_model::clip::Shape;
@@ -100,8 +101,8 @@ fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
     }
 }
 
-fn stages(timings: &[(String, f64)]) -> serde_json::Value {
-    timings.iter().map(|(stage, ms)| (stage.clone(), serde_json::Value::from(*ms))).collect()
+fn stages(timings: &Timings) -> serde_json::Value {
+    timings.iter().map(|timing| (timing.stage.name, serde_json::Value::from(timing.ms))).collect()
 }
 
 fn as_json(input: &str, report: &Report) -> serde_json::Value {

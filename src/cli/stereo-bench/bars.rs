@@ -9,14 +9,16 @@ use super::machine;
 use super::statistics::median;
 use anyhow::{Context, Result};
 use cao::cast::lao::{Bindings, Work};
-use cao::cast::volumes::{Kernels, Settings, Volumes, read_values};
+use cao::cast::volumes::{Kernels, Volumes};
+use cao::host::read_values;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
 use cao::renderer::{COLOUR, Renderer};
+use cao::stages;
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
-use cao_gpu::{Access, DeviceKind, Gpu, Timings};
+use cao_gpu::{Access, DeviceKind, Gpu, Phase, Stage};
 use cao_measure::error::errors;
 use cao_measure::random::Random;
 use cao_measure::reference::{Plan, ambient};
@@ -34,6 +36,8 @@ use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
+
+const LAO_UNIT: Stage = Stage::new("lao (unit)", Phase::Ambient);
 
 /// Alternating measurements of each row; medians and ranges of them are printed.
 const RUNS: usize = 5;
@@ -91,16 +95,13 @@ fn setup(scene: &Scene, rays: RaySet, radius_voxels: f32, scope: Scope) -> Setup
     setup
 }
 
-fn sum(timings: &Timings) -> f64 {
-    timings.iter().map(|(_, ms)| ms).sum()
-}
-
 /// `LAO (unit)` of a scene without clips on a sample of its bricks.
 struct Baseline {
     kernels: Kernels,
     volumes: Volumes,
     field: Field,
-    settings: Settings,
+    occlusion: Occlusion,
+    reference_mm: f32,
     list: BrickList,
     bricks: u32,
     /// All bricks / those in the list.
@@ -113,8 +114,7 @@ impl Baseline {
         let spacing = scene.volume.min_spacing();
         let occlusion =
             Occlusion { rays, radius_mm: radius_voxels * scene.voxel(), ..Occlusion::paper(spacing) };
-        let settings =
-            Settings { occlusion, scope: Scope::All, reference_mm: scene.transfer.reference_mm(spacing) };
+        let reference_mm = scene.transfer.reference_mm(spacing);
         let (kernels, volumes) = (Kernels::new(gpu)?, Volumes::new(gpu, &field)?);
         let transfer = TransferBuffer::new(gpu)?;
         let mut rec = gpu.recorder("baseline")?;
@@ -134,7 +134,7 @@ impl Baseline {
         bricks.truncate(wanted as usize);
         let list = BrickList::of(gpu, &bricks)?;
         let scale = f64::from(all) / f64::from(wanted);
-        Ok(Self { kernels, volumes, field, settings, list, bricks: wanted, scale })
+        Ok(Self { kernels, volumes, field, occlusion, reference_mm, list, bricks: wanted, scale })
     }
 
     /// Time of all bricks in ms, by that of the listed ones.
@@ -146,24 +146,23 @@ impl Baseline {
             precomputed: &self.volumes.full_opacity,
             ambient: &self.volumes.ambient,
         };
-        let Settings { occlusion, scope, reference_mm } = self.settings;
         let mut rec = gpu.recorder("lao (unit)")?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite]);
-        rec.stage("lao (unit)")?;
+        rec.stage(LAO_UNIT)?;
         let (field, count) = (&self.field, self.bricks);
         self.kernels.lao.record_part(
             &mut rec,
             field,
-            &occlusion,
-            reference_mm,
-            scope,
+            &self.occlusion,
+            self.reference_mm,
+            Scope::All,
             Work::Full,
             bindings,
             0,
             count,
         )?;
         rec.end_stage()?;
-        Ok(sum(&rec.submit_and_wait()?) * self.scale)
+        Ok(rec.submit_and_wait()?.total() * self.scale)
     }
 
     fn note(&self) -> String {
@@ -174,7 +173,7 @@ impl Baseline {
 /// Time of a whole update by sweeps in ms: nothing is taken as known.
 fn full_update(renderer: &mut Renderer) -> Result<f64> {
     renderer.invalidate();
-    Ok(sum(&renderer.update(&mut |_| ())?))
+    Ok(renderer.update(&mut |_| ())?.total())
 }
 
 fn sweep_against_lao(
@@ -273,7 +272,7 @@ fn clip_update(gpu: &Gpu, scene: &Scene, moves: [Vec3; 2], place: &'static str, 
     for run in 0..RUNS {
         times[0].push(full_update(&mut renderer)?);
         renderer.set_clips(&[clip(moves[(run + 1) % 2])])?;
-        times[1].push(sum(&renderer.update(&mut |_| ())?));
+        times[1].push(renderer.update(&mut |_| ())?.total());
         touched = f64::from(renderer.categories()?.affected) / scene.volume.len() as f64;
     }
     let ratios = times[0].iter().zip(&times[1]).map(|(full, update)| full / update).collect();
@@ -320,7 +319,7 @@ fn against_simd(gpu: &Gpu, scene: &Scene) -> Result<Row> {
         times[0].push(start.elapsed().as_secs_f64() * 1e3);
         renderer.invalidate();
         let timings = renderer.update(&mut |_| ())?;
-        times[1].push(timings.iter().filter(|(stage, _)| stage == "sweep").map(|(_, ms)| ms).sum());
+        times[1].push(timings.iter().filter(|t| t.stage == stages::SWEEP).map(|t| t.ms).sum());
     }
     let ratios = times[0].iter().zip(&times[1]).map(|(simd, device)| device / simd).collect();
     let note = format!(

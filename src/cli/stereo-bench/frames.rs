@@ -1,9 +1,11 @@
 //! The frames of some configurations: every method of each in turn, along the path, timed.
 
+use cao_measure::split::Split;
 use super::method::Method;
 use super::path;
 use anyhow::{Context, Result};
-use cao::renderer::{COLOUR, Categories, Renderer};
+use cao::method::Categories;
+use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
 use cao_model::clip::Shape;
 use cao_model::settings::Setup;
@@ -58,24 +60,17 @@ pub struct Frame {
     pub categories: Categories,
 }
 
-/// The parts of a frame as the paper names them (CAO Fig. 9).
-pub const PARTS: [&str; 4] = ["clipping", "spherical ray cast", "rendering", "overhead"];
+/// The parts of a frame as the paper names them (CAO Fig. 9), and what no stage accounts for.
+pub const PARTS: [&str; 4] = {
+    let [clipping, rays, rendering] = Split::PARTS;
+    [clipping, rays, rendering, "overhead"]
+};
 
 impl Frame {
-    /// Times of the [`PARTS`] in ms. What is neither clipping nor for the drawing brings the ambient volume up to date; what no stage
-    /// accounts for is overhead: recording, submission, waiting.
+    /// Times of the [`PARTS`] in ms; overhead is recording, submission, waiting.
     pub fn parts(&self) -> [f64; 4] {
-        let mut parts = [0.0; 4];
-        for (stage, ms) in &self.stages {
-            parts[match stage.as_str() {
-                "classify" | "carve" => 0,
-                // Which bricks rays leap over changes with the clips too.
-                "occupancy" | "distances" | "raycast" => 2,
-                _ => 1,
-            }] += ms;
-        }
-        parts[3] = (self.wall - parts.iter().sum::<f64>()).max(0.0);
-        parts
+        let [clipping, rays, rendering] = Split::of(&self.stages).parts();
+        [clipping, rays, rendering, (self.wall - self.stages.total()).max(0.0)]
     }
 }
 
@@ -211,10 +206,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_stage_belongs_to_one_part_and_the_rest_is_overhead() {
-        let stages =
-            [("classify", 1.0), ("bricks", 0.5), ("contextual", 4.0), ("distances", 0.25), ("raycast", 1.75)];
-        let stages = stages.map(|(name, ms)| (name.to_owned(), ms)).to_vec();
+    fn what_no_stage_accounts_for_is_overhead() {
+        let mut stages = Timings::new();
+        [(cao::stages::CLASSIFY, 1.0), (cao::stages::CONTEXTUAL, 4.5), (cao::stages::RAYCAST, 2.0)]
+            .map(|(stage, ms)| stages.push(stage, ms));
         let mut frame = Frame { wall: 8.0, stages, categories: Categories::default() };
         assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
         // Clocks of device and host may disagree by a little; no time is negative.

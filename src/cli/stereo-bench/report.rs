@@ -206,13 +206,13 @@ fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
 /// Median time of every stage, by the stage's own name; a stage that a frame lacks took no time in it.
 fn stages(m: &Measured) -> Map<String, Value> {
     let mut names: Vec<&str> = Vec::new();
-    for (name, _) in m.frames().flat_map(|frame| &frame.stages) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
+    for timing in m.frames().flat_map(|frame| &frame.stages) {
+        if !names.contains(&timing.stage.name) {
+            names.push(timing.stage.name);
         }
     }
     let time = |frame: &Frame, name: &str| -> f64 {
-        frame.stages.iter().filter(|(stage, _)| stage == name).map(|(_, ms)| ms).sum()
+        frame.stages.iter().filter(|t| t.stage.name == name).map(|t| t.ms).sum()
     };
     names
         .into_iter()

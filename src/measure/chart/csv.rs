@@ -22,9 +22,9 @@ pub fn runs(chart: &Chart) -> String {
 fn stages(chart: &Chart) -> Vec<&str> {
     let mut names: Vec<&str> = Vec::new();
     let points = chart.scenes.iter().flat_map(|scene| &scene.points);
-    for (stage, _) in points.flat_map(|point| &point.runs).flat_map(|run| &run.stages) {
-        if !names.contains(&stage.as_str()) {
-            names.push(stage);
+    for timing in points.flat_map(|point| &point.runs).flat_map(|run| &run.stages) {
+        if !names.contains(&timing.stage.name) {
+            names.push(timing.stage.name);
         }
     }
     names
@@ -48,7 +48,7 @@ fn lines(text: &mut String, scene: &SceneChart, point: &Point, stages: &[&str]) 
         ];
         *text += &head.join(",");
         for stage in stages {
-            let parts = run.stages.iter().filter(|(name, _)| name == stage).map(|(_, ms)| *ms);
+            let parts = run.stages.iter().filter(|t| t.stage.name == *stage).map(|t| t.ms);
             let ms = parts.reduce(|a, b| a + b);
             *text += &ms.map_or(",".into(), |ms| format!(",{ms}"));
         }

@@ -16,9 +16,11 @@ pub mod tables;
 use super::contender::{self, Ambient, Asked, BASELINE, Change, Contender, Entry, Setting, State, Subject};
 use super::error::{Errors, errors, shape_errors};
 use super::reference::{self, Reference};
+use super::split::Split;
 use super::ssim::{Constants, ssim_3d};
 use crate::{Error, Result};
-use cao::renderer::{COLOUR, Categories, Renderer};
+use cao::method::Categories;
+use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{DeviceKind, Gpu, Timings};
 use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::look::Look;
@@ -209,10 +211,9 @@ impl Point {
         front::quartiles(self.runs.iter().map(|run| run.ratio))
     }
 
-    /// Median time of the stages that `of` chooses, ms.
-    pub fn stage_ms(&self, of: impl Fn(&str) -> bool) -> f64 {
-        let sum = |run: &Run| run.stages.iter().filter(|(name, _)| of(name)).map(|(_, ms)| ms).sum();
-        front::quartiles(self.runs.iter().map(sum))[1]
+    /// Median time in ms of one part of the frame's split.
+    pub fn part_ms(&self, of: impl Fn(Split) -> f64) -> f64 {
+        front::quartiles(self.runs.iter().map(|run| of(Split::of(&run.stages))))[1]
     }
 }
 
@@ -411,7 +412,7 @@ fn compete_in(
                 let stages = contender.update(change, states[run % 2])?;
                 work.done += Work::update(scene, entry);
                 // The sum of nothing is -0.
-                let total_ms = 0.0 + stages.iter().map(|(_, ms)| ms).sum::<f64>();
+                let total_ms = 0.0 + stages.total();
                 if run == 0 {
                     points[n].push(truth.judge(scene, subject, entry, change, &contender.ambient()?));
                     continue;
@@ -442,7 +443,7 @@ fn compete_in(
         }
         let mut times = Vec::new();
         for _ in 0..plan.runs {
-            times.push(contender.draw(&look)?.1.iter().map(|(_, ms)| ms).sum());
+            times.push(contender.draw(&look)?.1.total());
         }
         draws.push((entry.method, front::quartiles(times.into_iter())[1]));
     }
@@ -521,7 +522,7 @@ impl<'a> Stand<'a> {
             self.renderer.update(&mut |_| ())?;
         }
         let categories = self.renderer.categories()?;
-        let (difference, _) = self.renderer.verify(&mut |_| ())?;
+        let (difference, _) = cao::verify::verify(&self.renderer, &mut |_| ())?;
         Ok((categories, difference.recomputed as f64 / (difference.compared as f64).max(1.0)))
     }
 }

@@ -1,5 +1,6 @@
 //! The paper's tables with our numbers beside the printed ones (CAO Tables 1 to 3, Fig. 9), as HTML.
 
+use crate::split::Split;
 use super::draw::{self, Mark, with_spread};
 use super::peers::Peers;
 use super::{BASELINE, Change, Chart, Point, SceneChart};
@@ -171,36 +172,22 @@ pub(super) fn table_3(chart: &Chart) -> String {
     )
 }
 
-/// Parts of a frame in which the clip moved, ms.
-struct FrameParts {
-    clipping: f64,
-    rays: f64,
-    rendering: f64,
-}
-
-impl FrameParts {
-    fn total(&self) -> f64 {
-        self.clipping + self.rays + self.rendering
-    }
-}
-
 fn drawing(scene: &SceneChart, method: &str) -> f64 {
     scene.draws.iter().find(|(name, _)| *name == method).map_or(f64::NAN, |(_, ms)| *ms)
 }
 
 /// The frame of a method with the paper's sum and so many equal rays.
-fn frame(scene: &SceneChart, method: &str, rays: &str) -> Option<FrameParts> {
+fn frame(scene: &SceneChart, method: &str, rays: &str) -> Option<Split> {
     let own = |p: &&Point| {
         let left = p.setting.quadrature == Some(cao_model::occlusion::Quadrature::Left);
         p.change == Change::Clip && p.method == method && p.setting.label == rays && left
     };
     let point = scene.points.iter().find(own)?;
-    // Step 4 is the classification, and whatever depth maps a clip mesh asks for.
-    let clipping = |stage: &str| matches!(stage, "classify" | "peel" | "dilate");
-    Some(FrameParts {
-        clipping: point.stage_ms(clipping),
-        rays: point.stage_ms(|stage| !clipping(stage)),
-        rendering: drawing(scene, method),
+    Some(Split {
+        clipping: point.part_ms(|split| split.clipping),
+        rays: point.part_ms(|split| split.rays),
+        // The picture is measured for itself; what its rays may leap over belongs to the update.
+        rendering: point.part_ms(|split| split.rendering) + drawing(scene, method),
     })
 }
 

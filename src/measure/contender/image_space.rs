@@ -9,9 +9,11 @@ use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject, s
 use crate::Result;
 use crate::kernels::ssao::Ssao;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
-use cao_gpu::{Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_gpu::{Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage, Timings};
 use cao_model::look::Look;
 use cao_model::settings::Setup;
+
+const IMAGE_SPACE: Stage = Stage::new("image space", Phase::Ambient);
 
 /// A surface hides a point only if it is nearer by more than this many voxels: what the step of the rays that drew it leaves open.
 const BIAS_VOXELS: f64 = 0.25;
@@ -98,7 +100,7 @@ impl<'a> ImageSpace<'a> {
 
         let mut rec = gpu.recorder("image-space occlusion")?;
         let bias_mm = (BIAS_VOXELS * volume.min_spacing()) as f32;
-        rec.stage("image space")?;
+        rec.stage(IMAGE_SPACE)?;
         for (eye, to) in self.occlusion.iter().enumerate() {
             let (view, radius) = (&views[eye], self.radius_mm);
             self.ssao.record(&mut rec, view, &self.depth, eye as u32, radius, self.samples, bias_mm, to)?;

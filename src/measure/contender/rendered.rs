@@ -3,6 +3,7 @@
 use super::{Ambient, Change, Contender, Entry, Setting, State, Subject};
 use crate::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao::stages;
 use cao_gpu::Timings;
 use cao_model::look::Look;
 use cao_model::methods::Method;
@@ -58,7 +59,7 @@ impl Contender for Rendered<'_> {
         let mut timings = self.renderer.update(&mut |_| ())?;
         if self.setup.method == Method::Lao {
             // Maps of what the clips affect, which the renderer keeps ready for another method; a full computation asks for none (CAO §4).
-            timings.retain(|(stage, _)| stage != "dilate");
+            timings.0.retain(|timing| timing.stage != stages::DILATE);
         }
         Ok(timings)
     }

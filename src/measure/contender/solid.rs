@@ -43,7 +43,7 @@ impl Contender for Solid<'_> {
         change_to(&mut self.renderer, self.setup, change, &state)?;
         // What this brings up to date is the picture's opacity; there are no ambient values that could be late.
         self.renderer.update(&mut |_| ())?;
-        Ok(Vec::new())
+        Ok(Timings::new())
     }
 
     fn ambient(&self) -> Result<Ambient> {

@@ -80,7 +80,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             renderer.set_setup(Setup { maps, ..setup })?;
             renderer.set_clips(std::slice::from_ref(clip))?;
             renderer.update(&mut |_| ())?;
-            sum[3] += renderer.verify(&mut |_| ())?.0.different as usize;
+            sum[3] += cao::verify::verify(&renderer, &mut |_| ())?.0.different as usize;
             let literal = scene.stale(gpu, &peel, clip, resolution, &[Recipe::Single, Recipe::Half])?;
             let ours = scene.stale(gpu, &peel, clip, resolution, &[Recipe::Conservative])?;
             for (sum, stale) in sum.iter_mut().zip(literal.stale.iter().chain(&ours.stale)) {

@@ -208,7 +208,7 @@ fn settle(stage: &mut PlaneCut, tick: &mut dyn FnMut()) -> Result<Settling> {
     for frame in 0..MOVES + RESTS {
         let before = stage.renderer.read_ambient()?;
         stage.place(0.75 * (frame + 1).min(MOVES) as f64)?;
-        let (difference, _) = stage.renderer.verify(&mut |_| ())?;
+        let (difference, _) = cao::verify::verify(&stage.renderer, &mut |_| ())?;
         different += difference.different;
         ours.push([frame as f64, f64::from(difference.largest)]);
         // Ours equals a full recomputation where nothing differs, so that it serves as the truth.

@@ -183,7 +183,7 @@ fn compare(renderer: &Renderer, volume: &Volume, plan: &Plan, separation_mm: f32
         image.push(f64::from((shaded[0][pixel] - shaded[1][other]).abs()));
     }
     let differences = |points: &[Vec3]| -> Result<Vec<f64>> {
-        let seen = renderer.seen_by_both(&views, &look, points)?;
+        let seen = cao::verify::seen_by_both(renderer, &views, &look, points)?;
         // A difference of bits without one of value would count as none; ambient factors have one zero and no NaN.
         Ok(seen.iter().map(|[l, r]| f64::from((l.ambient - r.ambient).abs())).collect())
     };
