@@ -1,26 +1,6 @@
-//! Compiles `spirv/*.wgsl` into `$OUT_DIR/shaders.rs`, which `src/gpu/mod.rs` includes.
-//!
-//! `CAO_SHADER_DEBUG=1` keeps names in the SPIR-V, for graphics debuggers.
+//! Compiles `spirv/`, which `src/gpu/mod.rs` includes.
 
-#[allow(dead_code, reason = "the tests use parts that the build does not")]
-#[path = "spirv/compile/mod.rs"]
-mod compile;
-
-use std::{env, error::Error, fs, path::Path};
-
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=spirv");
-    println!("cargo::rerun-if-env-changed=CAO_SHADER_DEBUG");
-    let debug = env::var("CAO_SHADER_DEBUG").is_ok_and(|value| value != "0");
-    let options = compile::Options { bounds: compile::Bounds::Unchecked, debug };
-    match compile::folder(Path::new("spirv"), options) {
-        Ok(rust) => Ok(fs::write(Path::new(&env::var("OUT_DIR")?).join("shaders.rs"), rust)?),
-        Err(errors) => {
-            for line in errors.iter().flat_map(|error| error.lines()) {
-                println!("cargo::error={line}");
-            }
-            Err(format!("{} shaders do not compile", errors.len()).into())
-        }
-    }
+    cao_compile::build("spirv")
 }

@@ -33,7 +33,7 @@ mod transfer;
 mod validation;
 
 pub use access::Access;
-pub use bind::Bind;
+pub use bind::{Bind, Bindings, Flat};
 pub use buffer::{Buffer, BufferUse};
 pub use device::{Adopted, Gpu, OpenOptions};
 pub use draw::Attachments;
@@ -47,6 +47,7 @@ pub use timing::{Recorded, Timings};
 pub use validation::ValidationLog;
 
 /// The compiled shaders, one module a file of `spirv/`, made by `build.rs`.
+#[allow(clippy::approx_constant, reason = "a kernel's constants are the kernel's, digit by digit")]
 pub mod shaders {
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }
