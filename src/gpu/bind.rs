@@ -81,6 +81,12 @@ impl<const N: usize> Bindings for [(&str, Bind<'_>); N] {
     }
 }
 
+impl<B: Bindings + ?Sized> Bindings for &B {
+    fn list(&self) -> Vec<(&str, Bind<'_>)> {
+        (*self).list()
+    }
+}
+
 /// Keeps an object alive.
 pub(crate) type Keep = Arc<dyn Any + Send + Sync>;
 
