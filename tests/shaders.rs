@@ -287,7 +287,7 @@ fn a_struct_in_memory_has_every_member_and_every_gap() {
             What::Constant(_) => None,
         })
         .collect();
-    let expected: [(&str, u32, Vec<(&str, u32, u32)>); 4] = [
+    let expected = [
         ("Inner", 32, vec![("scale", 0, 16), ("count", 16, 4), ("pad", 20, 12)]),
         ("Params", 64, vec![("dims", 0, 16), ("inner", 16, 32), ("step", 48, 4), ("pad", 52, 12)]),
         ("Out", 8, vec![("total", 0, 4)]),
