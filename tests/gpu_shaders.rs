@@ -13,9 +13,10 @@ const BOTH: [Options; 2] =
 #[test]
 fn every_compute_entry_point_becomes_a_pipeline_with_and_without_bounds_checks() {
     let gpu = open();
-    for path in files(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/spirv"))).unwrap() {
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/spirv"));
+    for path in files(root).unwrap() {
         for options in BOTH {
-            let shader = leak(file(&path, options).unwrap_or_else(|e| panic!("{e}")));
+            let shader = leak(file(root, &path, options).unwrap_or_else(|e| panic!("{e}")).shader);
             for entry in shader.entry_points.iter().filter(|e| e.stage == Stage::Compute) {
                 gpu.compute(shader, entry.name).unwrap();
                 gpu.assert_clean()

@@ -1,10 +1,8 @@
 //! The shader build: every shipped shader compiles, is valid SPIR-V, and the compiler's own checks work.
 
-#[allow(dead_code, reason = "the build uses parts that these tests do not")]
-#[path = "../spirv/compile/mod.rs"]
-mod compile;
-
-use compile::{Bounds, Options, include::Source, reflect::Shader};
+use cao::gpu::{self, shaders};
+use cao_compile::{self as compile, Bounds, Kernel, Options, Source, What};
+use cao_reflect::{Shader, Stage};
 use std::{fs, path::Path, process::Command};
 
 const UNCHECKED: Options = Options { bounds: Bounds::Unchecked, debug: false };
@@ -25,12 +23,12 @@ fn files(list: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-fn compile_main(list: &[(&str, &str)]) -> Result<Shader, String> {
+fn compile_main(list: &[(&str, &str)]) -> Result<Kernel, String> {
     let folder = files(list);
-    compile::file(&folder.path().join("main.wgsl"), UNCHECKED)
+    compile::file(folder.path(), &folder.path().join("main.wgsl"), UNCHECKED)
 }
 
-fn compile_text(wgsl: &str) -> Result<Shader, String> {
+fn compile_text(wgsl: &str) -> Result<Kernel, String> {
     compile_main(&[("main.wgsl", wgsl)])
 }
 
@@ -63,7 +61,8 @@ fn every_shader_compiles_and_is_valid_with_and_without_bounds_checks() {
     for path in compile::files(folder()).unwrap() {
         for options in [UNCHECKED, CHECKED] {
             let what = format!("{} {:?}", path.display(), options.bounds);
-            let shader = compile::file(&path, options).unwrap_or_else(|e| panic!("{what}:\n{e}"));
+            let shader =
+                compile::file(folder(), &path, options).unwrap_or_else(|e| panic!("{what}:\n{e}")).shader;
             assert!(!shader.entry_points.is_empty(), "{what} has no entry point");
             assert_valid(&shader, &what);
         }
@@ -113,14 +112,14 @@ const SAMPLER: &str = "
 
 #[test]
 fn reflection_says_what_each_entry_point_touches() {
-    let s = compile_text(SAMPLER).unwrap();
+    let s = compile_text(SAMPLER).unwrap().shader;
     assert_valid(&s, "SAMPLER");
     let folder = files(&[("main.wgsl", SAMPLER)]);
     assert_valid(
-        &compile::file(&folder.path().join("main.wgsl"), CHECKED).unwrap(),
+        &compile::file(folder.path(), &folder.path().join("main.wgsl"), CHECKED).unwrap().shader,
         "SAMPLER with bounds checks",
     );
-    let names: Vec<_> = s.bindings.iter().map(|b| (b.binding, b.name.as_str())).collect();
+    let names: Vec<_> = s.bindings.iter().map(|b| (b.binding, b.name)).collect();
     let expected = [
         (0, "lengths"),
         (1, "out"),
@@ -136,7 +135,7 @@ fn reflection_says_what_each_entry_point_touches() {
     assert_eq!(s.push_bytes, 32);
     let uses = |entry: &str| -> Vec<(&str, bool, bool)> {
         let entry = s.entry_points.iter().find(|e| e.name == entry).unwrap();
-        entry.uses.iter().map(|u| (s.bindings[u.binding].name.as_str(), u.reads, u.writes)).collect()
+        entry.uses.iter().map(|u| (s.bindings[u.binding].name, u.reads, u.writes)).collect()
     };
     let main = [
         ("out", true, true),
@@ -154,43 +153,189 @@ fn reflection_says_what_each_entry_point_touches() {
     assert_eq!(
         facts,
         [
-            ("Compute", [4, 4, 4], 32),
-            ("Compute", [64, 1, 1], 0),
-            ("Vertex", [0; 3], 32),
-            ("Fragment", [0; 3], 0)
+            (Stage::Compute, [4, 4, 4], 32),
+            (Stage::Compute, [64, 1, 1], 0),
+            (Stage::Vertex, [0; 3], 32),
+            (Stage::Fragment, [0; 3], 0)
         ]
     );
 }
 
+/// What the compiler emits for a few awkward kernels; its own tests hold it to that text.
+#[expect(dead_code, reason = "these tests look at a part of it")]
+mod emitted {
+    include!("../spirv/compile/tests/kernels/emitted.rs");
+}
+
+/// The same as text.
+const EMITTED: &str = include_str!("../spirv/compile/tests/kernels/emitted.rs");
+
+/// Offsets as the WGSL specification has them, section 14.4.1.
 #[test]
-fn reflection_lays_out_every_struct_that_hosts_fill() {
-    let s = compile_text(SAMPLER).unwrap();
-    let layout = |name: &str| {
-        let l = s.layouts.iter().find(|l| l.name == name).unwrap();
-        (l.size, l.fields.iter().map(|(n, o, s)| (n.as_str(), *o, *s)).collect::<Vec<_>>())
+fn emitted_structs_lie_in_memory_as_in_wgsl() {
+    use emitted::awkward::{Awkward, Counted, Inner, Outer};
+    macro_rules! at {
+        ($of:ident: $($field:ident $offset:literal),+; $size:literal) => {
+            $(assert_eq!(std::mem::offset_of!($of, $field), $offset, stringify!($of.$field));)+
+            assert_eq!(size_of::<$of>(), $size, stringify!($of));
+        };
+    }
+    at!(Inner: direction 0, count 12, place 16, pad 24; 32);
+    at!(Outer: inner 0; 64);
+    at!(Counted: total 0; 16);
+    at!(Awkward: normal 0, weight 12, centre 16, size 32, corner 48, points 64, inner 96, turn 128, view 176, narrow 240,
+        pad 256, r#in 260, far 288, many 304; 1184);
+    assert_eq!(Counted::PARTS_AT, 16);
+    assert_eq!(size_of::<emitted::picture::Look>(), 16);
+}
+
+#[test]
+fn a_host_writes_a_struct_whole_and_its_bytes_are_the_kernels() {
+    use emitted::shared::parts::Inner;
+    let inner = Inner { direction: [1.0, 2.0, 3.0], count: 4, place: [5, 6], pad: Default::default() };
+    let bytes = bytemuck::bytes_of(&inner);
+    let words = [1.0_f32.to_bits(), 2.0_f32.to_bits(), 3.0_f32.to_bits(), 4, 5, 6, 0, 0];
+    assert_eq!(bytes, words.map(u32::to_ne_bytes).concat());
+    assert_eq!(bytemuck::pod_read_unaligned::<Inner>(bytes), inner);
+    // The kernels that ship, too.
+    let params: shaders::past::PastParams = bytemuck::Zeroable::zeroed();
+    assert_eq!(bytemuck::bytes_of(&params).len() as u32, shaders::past::SHADER.push_bytes);
+}
+
+#[test]
+fn emitted_constants_have_the_values_that_the_kernels_compute_with() {
+    use emitted::awkward as k;
+    let (step, below, turn, tiny, mask): (i32, i32, f32, f32, u32) =
+        (k::STEP, k::BELOW, k::TURN, k::TINY, k::MASK);
+    assert_eq!((step, below, turn, tiny, mask), (8, -9, std::f32::consts::TAU, 1e-6, u32::MAX));
+    assert_eq!((k::CHANGED, k::ALL_CHANGED), (256, 0xff00));
+    let wide: bool = k::WIDE;
+    assert!(wide);
+    assert_eq!((k::TILE, k::ZERO), ([8_u32, 4], [0_i32; 3]));
+    assert_eq!(k::MIXED, [1.0_f32, 2.0, 3.0, 3.0]);
+    assert_eq!(k::OFFSETS, [[0.5_f32; 3], [1.0, 2.0, 3.0]]);
+    assert_eq!(k::SCALED, [[turn, 0.0], [0.0, 1.0]]);
+    assert_eq!((k::MAIN_WORKGROUP, k::LIST_WORDS_WORKGROUP), ([4, 4, 2], [64, 1, 1]));
+    // Of the kernels that ship: of abstract type, and computed.
+    assert_eq!((shaders::sweep::CHUNK, shaders::sweep::TILE), (8, [8, 4]));
+    assert_eq!(shaders::near::ALL_CHANGED, 255 * shaders::shared::bricks::CHANGED);
+}
+
+/// Two kernels that include one file have its types in common.
+#[test]
+fn what_kernels_share_is_one_type() {
+    let one: emitted::picture::Inner = bytemuck::Zeroable::zeroed();
+    let _: emitted::awkward::Inner = one;
+    assert_eq!(EMITTED.matches("pub struct Inner").count(), 1);
+    assert_eq!(EMITTED.matches("pub const CHANGED").count(), 1);
+    assert!(!EMITTED.contains("struct Local"), "no buffer holds it");
+}
+
+/// That an entry point's struct has no other fields is what makes a missing or misspelt binding an error of the compiler.
+#[test]
+fn an_entry_points_bindings_are_exactly_what_it_touches() {
+    let list = |name: &str| {
+        let body = EMITTED.split(&format!("pub struct {name}Bindings<'a> {{")).nth(1).unwrap();
+        let body = body.split("\n    }").next().unwrap();
+        body.lines()
+            .filter_map(|line| line.trim().strip_prefix("pub ")?.strip_suffix(','))
+            .collect::<Vec<_>>()
     };
-    assert_eq!(
-        s.layouts.iter().map(|l| l.name.as_str()).collect::<Vec<_>>(),
-        ["Inner", "Out", "Params", "Push"]
-    );
-    assert_eq!(layout("Inner"), (32, vec![("scale", 0, 16), ("count", 16, 4)]));
-    assert_eq!(layout("Params"), (64, vec![("dims", 0, 16), ("inner", 16, 32), ("step", 48, 4)]));
-    assert_eq!(layout("Out").1, [("total", 0, 4), ("values", 4, 0)]);
+    let main = [
+        "awkward: &'a crate::gpu::Buffer",
+        "counted: &'a crate::gpu::Buffer",
+        "outer: &'a crate::gpu::Buffer",
+        "volume: &'a crate::gpu::Image",
+        "linear: &'a crate::gpu::Sampler",
+        "words: &'a crate::gpu::Buffer",
+    ];
+    assert_eq!(list("Main"), main);
+    assert_eq!(list("ListWords"), ["words: &'a crate::gpu::Buffer"]);
+    assert_eq!(list("Draw"), ["corners: &'a crate::gpu::Buffer", "before: crate::gpu::Flat<'a>"]);
+    assert!(EMITTED.contains("pub type ClearWordsBindings<'a> = ListWordsBindings<'a>;"));
+    assert!(!EMITTED.contains("NothingBindings"));
 }
 
 #[test]
 fn the_emitted_rust_is_the_same_for_the_same_sources() {
     let folder = files(&[
         ("b.wgsl", SAMPLER),
-        ("a.wgsl", "@compute @workgroup_size(1) fn main() {}"),
+        ("room/a.wgsl", "@compute @workgroup_size(1) fn main() {}"),
         ("shared/c.wgsl", "broken"),
     ]);
     let rust = compile::folder(folder.path(), UNCHECKED).unwrap();
     assert_eq!(rust, compile::folder(folder.path(), UNCHECKED).unwrap());
     let at = |text: &str| rust.find(text).unwrap_or_else(|| panic!("no {text} in\n{rust}"));
     assert!(at("pub mod a {") < at("pub mod b {"));
-    at("pub const PARAMS: Layout = Layout { name: \"Params\", size: 64");
-    assert!(!rust.contains("mod c"), "shared files are no shaders");
+    at("pub struct Params {");
+    at("assert!(size_of::<Params>() == 64);");
+    assert!(!rust.contains("mod c"), "what no kernel includes is no part of it");
+}
+
+#[test]
+fn a_struct_in_memory_has_every_member_and_every_gap() {
+    let kernel = compile_text(SAMPLER).unwrap();
+    let structs: Vec<_> = kernel
+        .items
+        .iter()
+        .filter_map(|item| match &item.what {
+            What::Struct(s, _) => Some((
+                s.name.as_str(),
+                s.span,
+                s.fields.iter().map(|f| (f.name.as_str(), f.offset, f.size)).collect(),
+            )),
+            What::Constant(_) => None,
+        })
+        .collect();
+    let expected = [
+        ("Inner", 32, vec![("scale", 0, 16), ("count", 16, 4), ("pad", 20, 12)]),
+        ("Params", 64, vec![("dims", 0, 16), ("inner", 16, 32), ("step", 48, 4), ("pad", 52, 12)]),
+        ("Out", 8, vec![("total", 0, 4)]),
+        ("Push", 32, vec![("eye", 0, 16), ("index", 16, 4), ("pad", 20, 12)]),
+    ];
+    assert_eq!(structs, expected);
+}
+
+#[test]
+fn two_kernels_of_one_name_are_refused_whatever_their_rooms() {
+    let empty = "@compute @workgroup_size(1) fn main() {}";
+    let folder = files(&[("cast/a.wgsl", empty), ("draw/a.wgsl", empty), ("draw/b.wgsl", empty)]);
+    let errors = compile::folder(folder.path(), UNCHECKED).unwrap_err();
+    assert_eq!(errors.len(), 1, "{errors:?}");
+    assert!(errors[0].contains("cast/a.wgsl") && errors[0].contains("draw/a.wgsl"), "{errors:?}");
+    let folder = files(&[("cast/shared.wgsl", empty)]);
+    assert!(compile::folder(folder.path(), UNCHECKED).unwrap_err()[0].contains("shared.wgsl"));
+}
+
+/// A shared constant may be made of one that each kernel has.
+#[test]
+fn an_included_file_that_says_two_things_is_refused() {
+    let shared = ("shared/c.wgsl", "\nconst TWICE = 2u * ONCE;");
+    let kernel = |once: u32| {
+        format!(
+            "#include \"shared/c.wgsl\"\nconst ONCE = {once}u;\n@compute @workgroup_size(1) fn main() {{ _ = TWICE; }}"
+        )
+    };
+    let folder = files(&[("a.wgsl", &kernel(1)), ("b.wgsl", &kernel(1)), shared]);
+    let rust = compile::folder(folder.path(), UNCHECKED).unwrap();
+    assert_eq!(rust.matches("pub const TWICE: u32 = 2;").count(), 1);
+    let folder = files(&[("a.wgsl", &kernel(1)), ("b.wgsl", &kernel(2)), shared]);
+    let errors = compile::folder(folder.path(), UNCHECKED).unwrap_err();
+    for part in ["c.wgsl:2", "a.wgsl", "b.wgsl"] {
+        assert!(errors[0].contains(part), "{errors:?}");
+    }
+}
+
+/// Declarations are found line by line; one that is not found must not go missing.
+#[test]
+fn a_declaration_in_the_middle_of_a_line_is_refused() {
+    let main = "@compute @workgroup_size(1) fn main() {}";
+    let message = refused(&format!("struct S {{ x: u32 }} const N = 1u;\n{main}"));
+    assert!(message.contains("`N`"), "{message}");
+    let message = refused(&format!(
+        "const N = 1u; struct S {{ x: u32 }}\n@group(0) @binding(0) var<uniform> s: S;\n{main}"
+    ));
+    assert!(message.contains("`S`"), "{message}");
 }
 
 #[test]
@@ -268,7 +413,7 @@ fn an_include_cycle_is_refused_at_the_line_that_closes_it() {
 #[test]
 fn lines_map_back_through_includes() {
     let folder = files(&[("main.wgsl", "a\n#include \"x.wgsl\"\nb\n"), ("x.wgsl", "c\nd\n")]);
-    let source = Source::read(&folder.path().join("main.wgsl")).unwrap();
+    let source = Source::read(folder.path(), &folder.path().join("main.wgsl")).unwrap();
     assert_eq!(source.text, "a\nc\nd\nb\n");
     let origin = |line| {
         source.origin(line).map(|(path, n)| (path.file_name().unwrap().to_str().unwrap().to_owned(), n))

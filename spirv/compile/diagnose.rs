@@ -1,6 +1,6 @@
 //! Error reports with the line of the real file, also when it was included.
 
-use super::include::Source;
+use super::Source;
 use naga::{Span, WithSpan, front::wgsl::ParseError, valid::ValidationError};
 use std::error::Error;
 

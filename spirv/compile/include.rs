@@ -7,23 +7,23 @@ use std::path::{Path, PathBuf};
 pub struct Source {
     /// The whole text.
     pub text: String,
+    /// The file itself, then what it includes, in the order in which they begin.
+    pub files: Vec<PathBuf>,
     /// File and line (from 1) of each line of `text`.
     lines: Vec<(usize, usize)>,
-    files: Vec<PathBuf>,
 }
 
 impl Source {
-    /// Reads a file and what it includes. Paths are relative to the folder of this first file; each file is included once, where it
-    /// is first asked for.
-    pub fn read(path: &Path) -> Result<Self, String> {
+    /// Reads a file and what it includes. Paths of includes are relative to `root`; each file is included once, where it is first
+    /// asked for.
+    pub fn read(root: &Path, path: &Path) -> Result<Self, String> {
         let mut source = Self { text: String::new(), lines: Vec::new(), files: Vec::new() };
-        let folder = path.parent().and_then(Path::parent).unwrap_or(Path::new("")).to_owned();
-        source.append(&folder, path, &mut Vec::new()).map_err(|e| format!("error: {e}"))?;
+        source.append(root, path, &mut Vec::new()).map_err(|e| format!("error: {e}"))?;
         Ok(source)
     }
 
     /// `open` are the files that are being included, outermost first.
-    fn append(&mut self, folder: &Path, path: &Path, open: &mut Vec<usize>) -> Result<(), String> {
+    fn append(&mut self, root: &Path, path: &Path, open: &mut Vec<usize>) -> Result<(), String> {
         if let Some(seen) = self.files.iter().position(|file| file == path) {
             let cycle = open.contains(&seen);
             return if cycle { Err("includes itself, through this line".into()) } else { Ok(()) };
@@ -37,7 +37,7 @@ impl Source {
                 let at = |problem: &str| format!("{}:{}: {problem}", path.display(), i + 1);
                 let name = rest.trim().strip_prefix('"').and_then(|r| r.strip_suffix('"'));
                 let name = name.ok_or_else(|| at("expected #include \"file\""))?;
-                self.append(folder, &folder.join(name), open).map_err(|e| at(&e))?;
+                self.append(root, &root.join(name), open).map_err(|e| at(&e))?;
             } else {
                 self.text.push_str(line);
                 self.text.push('\n');

@@ -1,131 +1,28 @@
-//! What the host needs to know about a shader, taken from naga's module. Mirrors `src/gpu/shader.rs`, which holds it at run time.
+//! What the Vulkan layer needs to know about a shader, taken from naga's module.
 
+use cao_reflect::{
+    Binding, BindingKind, EntryPoint, Format, ImageBinding, Shader, Stage, Texel, Use, ViewDim,
+};
 use naga::{
-    AddressSpace, GlobalVariable, Handle, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage,
-    StorageFormat, TypeInner,
+    AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, ScalarKind, ShaderStage, StorageFormat,
+    TypeInner,
     proc::Layouter,
     valid::{GlobalUse, ModuleInfo},
 };
-use std::collections::BTreeMap;
 
-/// One compiled file.
-#[derive(Debug)]
-pub struct Shader {
-    /// File stem.
-    pub name: String,
-    /// SPIR-V words.
-    pub spirv: Vec<u32>,
-    /// In the order of the source.
-    pub entry_points: Vec<EntryPoint>,
-    /// Sorted by group and number.
-    pub bindings: Vec<Binding>,
-    /// Size of the immediate block in bytes.
-    pub push_bytes: u32,
-    /// Structs in uniform, storage and immediate variables, sorted by name.
-    pub layouts: Vec<Layout>,
-}
-
-/// One entry point.
-#[derive(Debug)]
-pub struct EntryPoint {
-    /// Name.
-    pub name: String,
-    /// "Compute", "Vertex" or "Fragment".
-    pub stage: &'static str,
-    /// Workgroup size, zeros except for compute.
-    pub workgroup: [u32; 3],
-    /// Bindings it touches.
-    pub uses: Vec<Use>,
-    /// Size of the immediate block if it touches it.
-    pub push_bytes: u32,
-}
-
-/// How an entry point touches a binding.
-#[derive(Debug, Clone, Copy)]
-pub struct Use {
-    /// Index into the bindings.
-    pub binding: usize,
-    /// Reads it.
-    pub reads: bool,
-    /// Writes it.
-    pub writes: bool,
-}
-
-/// One binding.
-#[derive(Debug)]
-pub struct Binding {
-    /// Variable name.
-    pub name: String,
-    /// `@group`
-    pub group: u32,
-    /// `@binding`
-    pub binding: u32,
-    /// Kind of resource.
-    pub kind: BindingKind,
-    /// For images.
-    pub image: Option<ImageBinding>,
-    /// Some entry point reads it.
-    pub reads: bool,
-    /// Some entry point writes it.
-    pub writes: bool,
-}
-
-/// Kind of resource.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BindingKind {
-    /// `var<uniform>`
-    Uniform,
-    /// `var<storage>`
-    Storage,
-    /// `texture_*`
-    Sampled,
-    /// `texture_storage_*`
-    StorageImage,
-    /// `sampler`
-    Sampler,
-}
-
-/// What an image binding takes, in the names of `src/gpu/shader.rs` and `src/gpu/format.rs`.
-#[derive(Debug, Clone, Copy)]
-pub struct ImageBinding {
-    /// `ViewDim`
-    pub view: &'static str,
-    /// `Texel`
-    pub texel: &'static str,
-    /// `Format` of a storage image.
-    pub format: Option<&'static str>,
-}
-
-/// Memory layout of a struct.
-#[derive(Debug)]
-pub struct Layout {
-    /// Name.
-    pub name: String,
-    /// Size in bytes.
-    pub size: u32,
-    /// Name, offset and size of each member.
-    pub fields: Vec<(String, u32, u32)>,
-}
-
-/// Collects everything; the error says what our Vulkan layer cannot serve.
+/// Collects everything; the error says what our Vulkan layer cannot serve. The memory is never freed: a shader is `'static`, as those
+/// that are built in.
 pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) -> Result<Shader, String> {
     let mut layouter = Layouter::default();
     layouter.update(module.to_ctx()).map_err(|e| e.to_string())?;
     let mut bindings = Vec::new();
     let mut push = None;
-    let mut layouts = BTreeMap::new();
     for (handle, variable) in module.global_variables.iter() {
         if variable.space == AddressSpace::Immediate {
             push = Some((handle, layouter[variable.ty].size));
         }
         if let Some(binding) = binding(module, variable)? {
             bindings.push((handle, binding));
-        }
-        if matches!(
-            variable.space,
-            AddressSpace::Uniform | AddressSpace::Storage { .. } | AddressSpace::Immediate
-        ) {
-            structs(module, &layouter, variable.ty, &mut layouts);
         }
     }
     bindings.sort_by_key(|(_, b)| (b.group, b.binding));
@@ -147,27 +44,26 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
             uses.push(Use { binding: index, reads, writes });
         }
         let stage = match entry.stage {
-            ShaderStage::Compute => "Compute",
-            ShaderStage::Vertex => "Vertex",
-            ShaderStage::Fragment => "Fragment",
+            ShaderStage::Compute => Stage::Compute,
+            ShaderStage::Vertex => Stage::Vertex,
+            ShaderStage::Fragment => Stage::Fragment,
             other => return Err(format!("entry point `{}` has the unsupported stage {other:?}", entry.name)),
         };
         let push_bytes = push.filter(|(handle, _)| !used[*handle].is_empty()).map_or(0, |(_, size)| size);
         entry_points.push(EntryPoint {
-            name: entry.name.clone(),
+            name: entry.name.clone().leak(),
             stage,
             workgroup: entry.workgroup_size,
-            uses,
+            uses: uses.leak(),
             push_bytes,
         });
     }
     Ok(Shader {
-        name: name.into(),
-        spirv,
-        entry_points,
-        bindings: bindings.into_iter().map(|(_, b)| b).collect(),
+        name: name.to_owned().leak(),
+        spirv: spirv.leak(),
+        entry_points: entry_points.leak(),
+        bindings: bindings.into_iter().map(|(_, b)| b).collect::<Vec<_>>().leak(),
         push_bytes: push.map_or(0, |(_, size)| size),
-        layouts: layouts.into_values().collect(),
     })
 }
 
@@ -184,21 +80,21 @@ fn binding(module: &Module, variable: &GlobalVariable) -> Result<Option<Binding>
         (_, TypeInner::Sampler { .. }) => (BindingKind::Sampler, None),
         (_, TypeInner::Image { dim, arrayed, class }) => {
             let view = match (dim, arrayed) {
-                (ImageDimension::D2, false) => "D2",
-                (ImageDimension::D2, true) => "D2Array",
-                (ImageDimension::D3, _) => "D3",
+                (ImageDimension::D2, false) => ViewDim::D2,
+                (ImageDimension::D2, true) => ViewDim::D2Array,
+                (ImageDimension::D3, _) => ViewDim::D3,
                 _ => return refuse("is neither a 2D nor a 3D texture"),
             };
             let (kind, texel, format) = match class {
                 ImageClass::Sampled { kind, multi: false } => (BindingKind::Sampled, texel(*kind), None),
-                ImageClass::Depth { multi: false } => (BindingKind::Sampled, "Depth", None),
+                ImageClass::Depth { multi: false } => (BindingKind::Sampled, Texel::Depth, None),
                 ImageClass::Storage { format, .. } => {
-                    let Some(name) = format_name(*format) else {
+                    let Some(ours) = storage_format(*format) else {
                         return refuse(&format!(
-                            "has format {format:?}, which src/gpu/format.rs does not have"
+                            "has format {format:?}, which cao_reflect::Format does not have"
                         ));
                     };
-                    (BindingKind::StorageImage, texel(naga::Scalar::from(*format).kind), Some(name))
+                    (BindingKind::StorageImage, texel(naga::Scalar::from(*format).kind), Some(ours))
                 }
                 _ => return refuse("is of an unsupported texture type"),
             };
@@ -206,56 +102,38 @@ fn binding(module: &Module, variable: &GlobalVariable) -> Result<Option<Binding>
         }
         _ => return refuse("is of an unsupported type"),
     };
-    Ok(Some(Binding { name, group: at.group, binding: at.binding, kind, image, reads: false, writes: false }))
+    Ok(Some(Binding {
+        name: name.leak(),
+        group: at.group,
+        binding: at.binding,
+        kind,
+        image,
+        reads: false,
+        writes: false,
+    }))
 }
 
-fn texel(kind: ScalarKind) -> &'static str {
+fn texel(kind: ScalarKind) -> Texel {
     match kind {
-        ScalarKind::Uint => "Uint",
-        ScalarKind::Sint => "Sint",
-        _ => "Float",
+        ScalarKind::Uint => Texel::Uint,
+        ScalarKind::Sint => Texel::Sint,
+        _ => Texel::Float,
     }
 }
 
-/// The formats of `src/gpu/format.rs` that storage images can have.
-fn format_name(format: StorageFormat) -> Option<&'static str> {
+/// Our formats that storage images can have.
+fn storage_format(format: StorageFormat) -> Option<Format> {
     Some(match format {
-        StorageFormat::R8Unorm => "R8Unorm",
-        StorageFormat::R8Uint => "R8Uint",
-        StorageFormat::R16Unorm => "R16Unorm",
-        StorageFormat::R16Float => "R16Float",
-        StorageFormat::R32Float => "R32Float",
-        StorageFormat::R32Uint => "R32Uint",
-        StorageFormat::Rg32Float => "Rg32Float",
-        StorageFormat::Rgba8Unorm => "Rgba8Unorm",
-        StorageFormat::Rgba16Float => "Rgba16Float",
-        StorageFormat::Rgba32Float => "Rgba32Float",
+        StorageFormat::R8Unorm => Format::R8Unorm,
+        StorageFormat::R8Uint => Format::R8Uint,
+        StorageFormat::R16Unorm => Format::R16Unorm,
+        StorageFormat::R16Float => Format::R16Float,
+        StorageFormat::R32Float => Format::R32Float,
+        StorageFormat::R32Uint => Format::R32Uint,
+        StorageFormat::Rg32Float => Format::Rg32Float,
+        StorageFormat::Rgba8Unorm => Format::Rgba8Unorm,
+        StorageFormat::Rgba16Float => Format::Rgba16Float,
+        StorageFormat::Rgba32Float => Format::Rgba32Float,
         _ => return None,
     })
-}
-
-/// Layouts of a struct and of the structs inside it.
-fn structs(
-    module: &Module,
-    layouter: &Layouter,
-    ty: Handle<naga::Type>,
-    found: &mut BTreeMap<String, Layout>,
-) {
-    match &module.types[ty].inner {
-        TypeInner::Array { base, .. } => structs(module, layouter, *base, found),
-        TypeInner::Struct { members, span } => {
-            let name = module.types[ty].name.clone().unwrap_or_default();
-            let fields = members.iter().map(|m| {
-                let run_time_sized = matches!(
-                    module.types[m.ty].inner,
-                    TypeInner::Array { size: naga::ArraySize::Dynamic, .. }
-                );
-                let size = if run_time_sized { 0 } else { layouter[m.ty].size };
-                (m.name.clone().unwrap_or_default(), m.offset, size)
-            });
-            found.insert(name.clone(), Layout { name, size: *span, fields: fields.collect() });
-            members.iter().for_each(|m| structs(module, layouter, m.ty, found));
-        }
-        _ => {}
-    }
 }

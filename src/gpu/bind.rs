@@ -26,6 +26,67 @@ pub enum Bind<'a> {
     Sampler(&'a Sampler),
 }
 
+impl<'a> From<&'a Buffer> for Bind<'a> {
+    fn from(buffer: &'a Buffer) -> Self {
+        Self::Buffer(buffer)
+    }
+}
+
+impl<'a> From<&'a Image> for Bind<'a> {
+    fn from(image: &'a Image) -> Self {
+        Self::Image(image)
+    }
+}
+
+impl<'a> From<&'a Sampler> for Bind<'a> {
+    fn from(sampler: &'a Sampler) -> Self {
+        Self::Sampler(sampler)
+    }
+}
+
+/// What a `texture_2d` takes: a flat image's only layer, or one of several.
+#[derive(Clone, Copy)]
+pub enum Flat<'a> {
+    /// The only one.
+    Only(&'a Image),
+    /// The one of this number.
+    Layer(&'a Image, u32),
+}
+
+impl<'a> From<Flat<'a>> for Bind<'a> {
+    fn from(flat: Flat<'a>) -> Self {
+        match flat {
+            Flat::Only(image) => Self::Image(image),
+            Flat::Layer(image, layer) => Self::Layer(image, layer),
+        }
+    }
+}
+
+/// Everything that a pipeline touches, by name. Each entry point of a built-in kernel has a struct of them, of which none can be
+/// forgotten or misspelt; for other shaders, a slice of pairs is checked when it is bound.
+pub trait Bindings {
+    /// Names and what is bound.
+    fn list(&self) -> Vec<(&str, Bind<'_>)>;
+}
+
+impl Bindings for [(&str, Bind<'_>)] {
+    fn list(&self) -> Vec<(&str, Bind<'_>)> {
+        self.to_vec()
+    }
+}
+
+impl<const N: usize> Bindings for [(&str, Bind<'_>); N] {
+    fn list(&self) -> Vec<(&str, Bind<'_>)> {
+        self.to_vec()
+    }
+}
+
+impl<B: Bindings + ?Sized> Bindings for &B {
+    fn list(&self) -> Vec<(&str, Bind<'_>)> {
+        (*self).list()
+    }
+}
+
 /// Keeps an object alive.
 pub(crate) type Keep = Arc<dyn Any + Send + Sync>;
 

@@ -2,7 +2,7 @@
 
 use super::{
     feature::{self, API_VERSION, EXTENSIONS, Features},
-    format::Format,
+    format::{Format, VulkanFormat},
     hazard::{Hazards, ResourceId},
     info::{DeviceInfo, choose, no_device},
     memory::Memory,

@@ -1,7 +1,7 @@
 //! Drawing into images.
 
 use super::{
-    Format, Image, ImageKind, ImageUse, Pipeline, Recorder, access::Access, bind::Bind, hazard::Touch,
+    Format, Image, ImageKind, ImageUse, Pipeline, Recorder, access::Access, bind::Bindings, hazard::Touch,
     pipeline::Targets, transfer::clear_colour,
 };
 use crate::{Error, Result};
@@ -35,12 +35,13 @@ impl Recorder {
     pub fn draw(
         &mut self,
         pipeline: &Pipeline,
-        binds: &[(&str, Bind<'_>)],
+        binds: &(impl Bindings + ?Sized),
         push: &[u8],
         attachments: Attachments<'_>,
         vertices: u32,
     ) -> Result<()> {
-        let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::GRAPHICS, binds, push)?;
+        let binds = binds.list();
+        let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::GRAPHICS, &binds, push)?;
         let Some(targets) = &pipeline.0.targets else { return Ok(()) };
         let refuse = |problem| Error::Config { what: pipeline.0.name.clone(), problem };
         check_formats(targets, &attachments).map_err(refuse)?;

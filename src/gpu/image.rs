@@ -3,7 +3,7 @@
 use super::{
     Gpu,
     device::{Inner, vulkan},
-    format::Format,
+    format::{Format, VulkanFormat},
     hazard::ResourceId,
 };
 use crate::{Error, Result};

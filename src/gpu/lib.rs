@@ -34,7 +34,7 @@ mod transfer;
 mod validation;
 
 pub use access::Access;
-pub use bind::Bind;
+pub use bind::{Bind, Bindings, Flat};
 pub use buffer::{Buffer, BufferUse};
 pub use device::{Adopted, Gpu, OpenOptions};
 pub use draw::Attachments;

@@ -4,7 +4,7 @@ use super::{
     Gpu,
     device::{Inner, vulkan},
     draw::COLOURS,
-    format::Format,
+    format::{Format, VulkanFormat},
     shader::{Binding, BindingKind, EntryPoint, Shader, Stage},
 };
 use crate::{Error, Result};

@@ -3,7 +3,7 @@
 use super::{
     Buffer, Gpu, Image, Pipeline,
     access::Access,
-    bind::{Bind, Keep, Resolved, resolve},
+    bind::{Bind, Bindings, Keep, Resolved, resolve},
     device::{Inner, vulkan},
     hazard::{Hazards, Touch},
     timing::{Recorded, Stage, Stages, Timings},
@@ -146,12 +146,13 @@ impl Recorder {
     pub fn dispatch(
         &mut self,
         pipeline: &Pipeline,
-        binds: &[(&str, Bind<'_>)],
+        binds: &(impl Bindings + ?Sized),
         push: &[u8],
         groups: [u32; 3],
     ) -> Result<()> {
         self.check_groups(pipeline, groups)?;
-        let resolved = self.prepare(pipeline, vk::PipelineBindPoint::COMPUTE, binds, push)?;
+        let binds = binds.list();
+        let resolved = self.prepare(pipeline, vk::PipelineBindPoint::COMPUTE, &binds, push)?;
         self.order(&pipeline.0.name, &resolved.touches)?;
         self.set(pipeline, vk::PipelineBindPoint::COMPUTE, resolved, push);
         // SAFETY: `cmd` is recording, pipeline and descriptors are set, the counts are within the device's limits.
@@ -166,7 +167,7 @@ impl Recorder {
     pub fn dispatch_over(
         &mut self,
         pipeline: &Pipeline,
-        binds: &[(&str, Bind<'_>)],
+        binds: &(impl Bindings + ?Sized),
         push: &[u8],
         invocations: [u32; 3],
     ) -> Result<()> {
@@ -183,7 +184,7 @@ impl Recorder {
     pub fn dispatch_indirect(
         &mut self,
         pipeline: &Pipeline,
-        binds: &[(&str, Bind<'_>)],
+        binds: &(impl Bindings + ?Sized),
         push: &[u8],
         buffer: &Buffer,
         offset: u64,
@@ -199,7 +200,8 @@ impl Recorder {
                 problem: "must be in a Device buffer at a multiple of 4".into(),
             });
         }
-        let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::COMPUTE, binds, push)?;
+        let binds = binds.list();
+        let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::COMPUTE, &binds, push)?;
         resolved.touches.push(Touch {
             id: buffer.0.id,
             name: buffer.name(),

@@ -3,6 +3,7 @@
 use super::{
     Buffer, BufferUse, Image, ImageKind, Recorder,
     access::Access,
+    format::VulkanFormat,
     hazard::Touch,
     image::{ImageInner, extent},
     shader::Texel,

@@ -2,11 +2,9 @@
 
 #![allow(dead_code, reason = "each test binary uses a part of it")]
 
-#[path = "../../spirv/compile/mod.rs"]
-pub mod compile;
-
-use cao_gpu::{Bind, Buffer, BufferUse, Format, Gpu, OpenOptions, Shader, shader};
-use compile::{Bounds, Options, reflect};
+use cao_gpu::{Bind, Buffer, BufferUse, Gpu, OpenOptions, Shader};
+pub use cao_compile as compile;
+use cao_compile::{Bounds, Options};
 
 /// A device under core and synchronization validation. Tests end with [`close`].
 pub fn open() -> Gpu {
@@ -32,88 +30,12 @@ pub fn compile_with(wgsl: &str, options: Options) -> &'static Shader {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.wgsl");
     std::fs::write(&path, wgsl).unwrap();
-    leak(compile::file(&path, options).unwrap_or_else(|e| panic!("{e}")))
-}
-
-fn leaked<T>(list: Vec<T>) -> &'static [T] {
-    list.leak()
+    leak(cao_compile::file(folder.path(), &path, options).unwrap_or_else(|e| panic!("{e}")).shader)
 }
 
 /// The form that the library takes; its memory is never freed, as that of a built-in shader.
-pub fn leak(s: reflect::Shader) -> &'static Shader {
-    let uses = |list: Vec<reflect::Use>| {
-        leaked(
-            list.into_iter()
-                .map(|u| shader::Use { binding: u.binding, reads: u.reads, writes: u.writes })
-                .collect(),
-        )
-    };
-    let entry_points = s.entry_points.into_iter().map(|e| shader::EntryPoint {
-        name: e.name.leak(),
-        stage: match e.stage {
-            "Compute" => shader::Stage::Compute,
-            "Vertex" => shader::Stage::Vertex,
-            _ => shader::Stage::Fragment,
-        },
-        workgroup: e.workgroup,
-        uses: uses(e.uses),
-        push_bytes: e.push_bytes,
-    });
-    let bindings = s.bindings.into_iter().map(|b| shader::Binding {
-        name: b.name.leak(),
-        group: b.group,
-        binding: b.binding,
-        kind: match b.kind {
-            reflect::BindingKind::Uniform => shader::BindingKind::Uniform,
-            reflect::BindingKind::Storage => shader::BindingKind::Storage,
-            reflect::BindingKind::Sampled => shader::BindingKind::Sampled,
-            reflect::BindingKind::StorageImage => shader::BindingKind::StorageImage,
-            reflect::BindingKind::Sampler => shader::BindingKind::Sampler,
-        },
-        image: b.image.map(|i| shader::ImageBinding {
-            view: match i.view {
-                "D2" => shader::ViewDim::D2,
-                "D2Array" => shader::ViewDim::D2Array,
-                _ => shader::ViewDim::D3,
-            },
-            texel: match i.texel {
-                "Float" => shader::Texel::Float,
-                "Uint" => shader::Texel::Uint,
-                "Sint" => shader::Texel::Sint,
-                _ => shader::Texel::Depth,
-            },
-            format: i.format.map(format),
-        }),
-        reads: b.reads,
-        writes: b.writes,
-    });
-    Box::leak(Box::new(Shader {
-        name: s.name.leak(),
-        entry_points: leaked(entry_points.collect()),
-        bindings: leaked(bindings.collect()),
-        spirv: leaked(s.spirv),
-        push_bytes: s.push_bytes,
-    }))
-}
-
-fn format(name: &str) -> Format {
-    use Format::*;
-    [
-        R8Unorm,
-        R8Uint,
-        R16Unorm,
-        R16Float,
-        R32Float,
-        R32Uint,
-        Rg32Float,
-        Rgba8Unorm,
-        Rgba16Float,
-        Rgba32Float,
-        D32Float,
-    ]
-    .into_iter()
-    .find(|f| format!("{f:?}") == name)
-    .unwrap_or_else(|| panic!("unknown format {name}"))
+pub fn leak(shader: Shader) -> &'static Shader {
+    Box::leak(Box::new(shader))
 }
 
 /// A device buffer with these numbers in it.

@@ -1,0 +1,5 @@
+#include "shared/parts.wgsl"
+
+struct Outer {
+    inner: array<Inner, 2>,
+}
