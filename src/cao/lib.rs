@@ -6,25 +6,24 @@
 //! picture, so the left and the right eye read the same one.
 //!
 //! ```text
-//! volume file ─ volume/ ─ transfer ─ [opacity] ─ [clip] ─ [ambient occlusion] ─ [raycast, both eyes] ─ image / engine's swapchain
-//!                                         stage/ + method/ + spirv/                   └ measure/ (errors, charts, stability)
+//! volume ─ Renderer::new ─ [occupancy] ─ [opacity, clips, ambient: the method] ─ [distances] ─ [raycast, all views] ─ image / engine's swapchain
+//!           field/           field/        cast/ sweep/, with clip/                draw/         draw/
 //! ```
 //!
-//! # The modules, in the order in which data pass through them
-//!
-//! Each uses only those above it.
+//! # The modules
 //!
 //! | module | what it is |
 //! |---|---|
-//! | [`error`] | what can go wrong, with the file, field, call or limit |
-//! | [`view`] [`transfer`] [`mesh`] [`occlusion`] [`lattice`] [`clip`] [`scene`] | plain data: the eyes; opacity and colour; triangle meshes; how occlusion is computed; the directions of a sweep; clip shapes and poses; the scene file |
-//! | [`volume`] [`picture`] | files in: NRRD, NIfTI, MetaImage, raw, built-in volumes; files out: NRRD, PNG |
-//! | [`cpu`] | the truth: each numerical stage once more, the paper's equation in plain loops. For tests, not a fallback |
-//! | [`gpu`] | Vulkan and nothing else: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
-//! | [`stage`] | the host side of each kernel of `spirv/`: parameters, bindings, `record` |
-//! | [`method`] | one method of ambient occlusion on one page each: dispatch, barrier, dispatch |
-//! | [`renderer`] | the frame: what changed, which stages run for it, both eyes |
-//! | [`measure`] | is it exact, do both eyes see the same; how far is each method from the truth, how fast, and where does it fail |
+//! | [`model`] | plain data, another crate: volumes, transfer functions, clips, views, settings, [`METHODS`]. Files come by `cao-formats` |
+//! | [`gpu`] | Vulkan and nothing else, another crate: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
+//! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
+//! | [`cast`] [`sweep`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
+//! | [`method`] [`drive`] | what a method is to the renderer; the two ways to walk its parts |
+//! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
+//! | [`verify`] | instruments: is it exact, do both eyes see the same, what would other settings give |
+//! | [`stages`] | every stage whose time is taken |
+//!
+//! Each kernel of `spirv/` has its host side here, its twin in `cao-twin` and its test in `tests/kernels/` under the same name.
 //!
 //! # Conventions, once and for all
 //!
@@ -48,31 +47,9 @@
 //!   premultiplied by their opacity.
 //! * **Values** of a volume keep the file's type and meaning (Hounsfield, 16 bits); nothing is rescaled to 8 bits.
 //!
-//! # A picture
+//! # Examples
 //!
-//! ```no_run
-//! use cao::glam::Vec3;
-//! use cao::{Clip, Gpu, Look, OpenOptions, Picture, Pose, Renderer, Setup, Shape, StereoRig, TransferFunction};
-//!
-//! # fn main() -> cao::Result<()> {
-//! let volume = cao::volume::open("builtin:engine:64")?; // or the path of a file
-//! let transfer = TransferFunction::load("auto", volume.range())?;
-//! let gpu = Gpu::open(&OpenOptions::default())?;
-//! let setup = Setup::swept(volume.min_spacing());
-//! let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, cao::renderer::COLOUR)?;
-//!
-//! // A ball of 20 mm is cut out of one corner. In a loop over frames: move it, update, draw.
-//! let pose = Pose { translate_mm: Vec3::new(19.0, -19.0, 19.0), scale: Vec3::splat(20.0), ..Pose::default() };
-//! renderer.set_clips(&[Clip { pose, ..Clip::remove(Shape::Sphere) }])?;
-//! renderer.update(&mut |_share_done| ())?;
-//!
-//! let views = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 1.0, 1000.0)?;
-//! let (image, _times) = renderer.draw(&views, &Look::default(), [512, 512])?;
-//! let [left, right] = image.colour.each_ref().map(|eye| Picture::over(512, 512, eye, [0.0; 3]));
-//! Picture::beside(&left, &right).write_png("stereo.png".as_ref())?;
-//! # Ok(())
-//! # }
-//! ```
+//! `docs/examples/` has a picture in thirty lines, a whole host in miniature, and every method at its settings.
 //!
 //! An engine that has a Vulkan device of its own hands it to [`Gpu::adopt`] and records with
 //! [`Renderer::record_update`] and [`Renderer::record_draw`] into its own command buffer ([`Gpu::record_into`]); nothing
@@ -112,3 +89,8 @@ pub use renderer::Renderer;
 
 /// The version whose vectors are in this crate's signatures.
 pub use glam;
+
+/// The README's example is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

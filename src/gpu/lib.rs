@@ -47,3 +47,6 @@ pub use recorder::Recorder;
 pub use shader::Shader;
 pub use timing::{Phase, Recorded, Stage, Timing, Timings};
 pub use validation::ValidationLog;
+
+/// The version whose handles are in this crate's signatures.
+pub use ash;
