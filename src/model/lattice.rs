@@ -13,18 +13,7 @@
 //! with real Y_lm of unit mean square over the sphere. The residual is the square root of that: the worst error of the mean of
 //! any function of degree L and unit mean square.
 //!
-//! What limits 50 directions where thin bones hide each other (torso of the test data, R = 50 voxels, RMSE at 3000 voxels; LAO with
-//! the paper's 54 rays has 0.0186): samples 1.45 voxels apart 0.0146, 1.15 apart 0.0127, infinitely fine 0.0112. So it is the
-//! directions: of all sets of 50 with their reverses, lattice or not, the best is predicted to reach 0.0094 where this one has 0.0097,
-//! and lattice sets of 72, 96, 120 reach 0.0080, 0.0066, 0.0059. What was tried to do with 50, samples 1.45 apart unless said:
-//!
-//! | instead | RMSE |
-//! |---|---|
-//! | every ray ends at R, by a fraction of a segment | 0.0146 |
-//! | lines of each direction shifted by a fixed ≤ ¼ voxel, all samples interpolated | 0.0117 to 0.0127 by seed |
-//! | far half of a ray through opacities blurred to the directions' spacing, fine samples | 0.0100 to 0.022, the best at R/2 |
-//! | … in three steps of blur, fitted to this volume | 0.0085; with real steps 0.0096, and worse on the engine |
-//! | two sets by the voxel's parity, each voxel corrected by its 26 neighbours, 3.4 times the samples | 0.0083 |
+//! What limits the directions, and what was tried to do with 50: `benches/runs/2026-11-24-llvmpipe-sweep/`.
 
 use crate::occlusion::RaySet;
 use glam::DVec3;

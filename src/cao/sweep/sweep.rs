@@ -1,6 +1,6 @@
 //! Line sweep (method.md §4): the window of every voxel along one lattice direction by two scans,
 //! `A_k(x) = S_k / (W − o/|v|)` with `(t, S) = head ∘ suffix ∘ prefix` of affine pairs, summed as
-//! `V_AO(x) = 1 − Σ_k w_k (1 − A_k(x))`, equal to evaluating each window directly ([`crate::cpu::sweep`]) up to rounding.
+//! `V_AO(x) = 1 − Σ_k w_k (1 − A_k(x))`, equal to evaluating each window directly (its twin) up to rounding.
 //!
 //! A line and its reverse are walked together. In: `opacity` V_o (3D r16unorm, read as a storage image), `todo` and `solid` of
 //! [`super::near`], the list of [`super::sweep_list`]. Out: `ambient` V_AO (3D r16unorm), only in bricks to do. Cost a voxel and line,
@@ -8,47 +8,11 @@
 //! write of V_AO; for R/8 segments one composition more in eight voxels. Eight segments that meet no brick with opacity are not
 //! read, and a ray that nothing occludes writes nothing.
 //!
-//! A ray's contribution is a whole number of 65535ths ([`crate::lattice::LatticeRays::parts`]), so V_AO is an exact sum in any order, and what
+//! A ray's contribution is a whole number of 65535ths ([`LatticeRays::parts`]), so V_AO is an exact sum in any order, and what
 //! a ray contributed can be taken back ([`Pass::TakeBack`]) by walking it through the opacities as they were. Every pass runs the same
 //! entry point of this one module: so full and partial updates agree bit for bit.
 //!
-//! Variants tried, in ns of processor time a voxel and direction, least of 2 or 3 (AMD EPYC, 2 cores, llvmpipe of Mesa
-//! 25.0.7, LLVM 15, 256 bit; 128³ gyroid, 26w, one piece, R 20 unless said, other work on the machine, so ± 5 %):
-//!
-//! | variant | ns |
-//! |---|---|
-//! | one direction at a time, blocks of a window in a private array, sampled V_o (R 50: 22.0) | 19.3 |
-//! | … compiled for one piece | 16.2 |
-//! | … and without the heads (wrong), to see their cost | 14.4 |
-//! | … for one piece, no `todo` / nor reading V_AO / nor array beyond 24 (the last two wrong for others) | 15.4 / 14.9 / 14.6 |
-//! | line and reverse, chunks of 8 in registers, guards for short windows (R 50: 13.3) | 11.7 |
-//! | … loops not unrolled | 13.6 |
-//! | … V_o read in batches of 8 before the arithmetic; the same not unrolled | 12.5; 11.9 |
-//! | … V_o as a sampled texture | 11.9 |
-//! | … chunks of 4 | 12.4 |
-//! | … no guards: this one (R 50: 11.8) | 9.8 to 10.5 |
-//! | … arrays of a chunk declared outside the loop, so not cleared for each chunk | 9.9 beside 9.8 |
-//!
-//! Then on `builtin:engine:128`, all voxels, where about a third of the chunks meet no opacity:
-//!
-//! | variant | R 20 | R 50 |
-//! |---|---|---|
-//! | that one | 11.7 | 12.1 |
-//! | … chunks without opacity neither read nor integrated, unoccluded rays write nothing; tiles of 8×4: this one | 8.4 | 10.2 |
-//! | … segments of `lead` not kept in arrays but branched over one by one | 8.9 to 9.2 beside 8.5 to 9.3 | |
-//! | … gaps as a branch over what is assigned before it | 8.6 to 9.1 beside 8.5 to 8.8 | |
-//! | … rays backwards in workgroup memory, not a private array (16 KB a group, the most that every device has) | 8.7 to 9.0 beside 8.4 to 8.7 | |
-//! | … the window a constant, the 6 rays along the axes: would need a pipeline for every radius | 9.2 to 9.5 beside 9.5 to 10.0 | |
-//!
-//! A chunk's machine code is some 16,000 instructions, a third of which move values to and from the stack: a call for each of
-//! 48 texels saves every vector register.
-//!
-//! So 4.2 to 5.3 ns on two cores, well below half of what it was. `benches/sweep_simd.rs`, segment rule, W = 20: 1.0 ns with AVX2 and
-//! 0.6 ns with AVX-512 at best on two cores (medians 1.8 and 0.8); the wanted factor of 2 is not reached.
-//!
-//! Of 11.4 ns with guards, what taking a part out saves: pairs of segments 3.9, V_AO 2.9 (`todo` less than 0.4 of it), both
-//! reads of V_o 2.2, heads 2.0, rays backwards and their array 2.0, gaps 0.8, middle and odd segments 0.4. A read of a
-//! storage image takes 0.7 to 0.9 ns alone, of a sampled one 1.4 to 1.7, `log` 0.34, `exp` 0.25, a division 0.06.
+//! Variants that were tried, and where the time goes: `benches/runs/2026-11-24-llvmpipe-sweep/`.
 
 use crate::field::Field;
 use bytemuck::{Pod, Zeroable};

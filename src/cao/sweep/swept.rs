@@ -6,8 +6,7 @@
 //! through the former opacities, taking back what they contributed, and once through the new ones. A voxel beside a change keeps
 //! what the rays that lead away from it contributed, which walking all its rays would compute again, each with a window of
 //! segments before it. Bricks that had no value yet are computed anew; so is everything within reach of a change where more bricks changed
-//! than are kept ([`PastBricks`]). Engine of the test data, 26 rays, R = 20 voxels, llvmpipe, before and after, full update and clip update
-//! in ms: sphere moved one voxel 590 and 191, 511 and 86; to a new place 600 and 300, 511 and 173.
+//! than are kept ([`PastBricks`]).
 //!
 //! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, an eighth for what was, and some 50 bytes a brick of
 //! 512 with the lists of lines.
