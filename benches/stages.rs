@@ -1,8 +1,6 @@
 //! Kernels, by the device's timestamps: the time that a stage takes inside an update or a frame, not that of the calls
 //! around it. 32³ voxels, 8 voxels radius, 128² pixels for each eye. On a software driver only ratios mean anything.
 
-mod common;
-
 use cao::glam::Vec3;
 use cao::renderer::COLOUR;
 use cao::{
@@ -136,5 +134,5 @@ fn stages(criterion: &mut Criterion) {
     bench.group.finish();
 }
 
-criterion_group! { name = benches; config = common::brief(); targets = stages }
+criterion_group! { name = benches; config = cao_benches::brief(); targets = stages }
 criterion_main!(benches);
