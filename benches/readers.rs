@@ -1,5 +1,7 @@
 //! Reading volumes: every format, from the page cache. 96³ values of 16 bits, 1.7 MiB.
 
+#![forbid(unsafe_code)]
+
 use cao_formats::write_nrrd;
 use cao_model::values::Values;
 use cao_model::volume::Volume;

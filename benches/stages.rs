@@ -1,6 +1,8 @@
 //! Kernels, by the device's timestamps: the time that a stage takes inside an update or a frame, not that of the calls
 //! around it. 32³ voxels, 8 voxels radius, 128² pixels for each eye. On a software driver only ratios mean anything.
 
+#![forbid(unsafe_code)]
+
 use cao::glam::Vec3;
 use cao::renderer::COLOUR;
 use cao::{

@@ -2,6 +2,8 @@
 //! are compared with (method.md §4). Prints the median of the runs and their range, for each set of vector instructions
 //! that the processor has; `Target` is what the crate is built for.
 
+#![forbid(unsafe_code)]
+
 use cao_model::occlusion::RaySet;
 use cao_simd::{Rule, Vectors, lines, sweep};
 use std::time::Instant;

@@ -1,11 +1,12 @@
 //! The CPU twins, which tests wait for. 24³ voxels, 6 voxels radius.
 
+#![forbid(unsafe_code)]
+
 use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::glam::Vec3;
 use cao_model::look::Look;
 use cao_model::mesh::TriangleMesh;
 use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
-use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_twin as twin;
 use cao_twin::Grid;

@@ -2,6 +2,8 @@
 //!
 //! `CAO_SHADER_DEBUG=1` keeps names in the SPIR-V, for graphics debuggers.
 
+#![forbid(unsafe_code)]
+
 use cao_compile as compile;
 use std::{env, error::Error, fs, path::Path};
 

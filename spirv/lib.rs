@@ -2,4 +2,6 @@
 //!
 //! One module a kernel, named as its file; the build makes them, nothing is written by hand.
 
+#![forbid(unsafe_code)]
+
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

@@ -1,6 +1,8 @@
 //! WGSL to SPIR-V with naga, and what reflection says about it. Included by `build.rs` and, by path, by the tests, so that both
 //! compile in the same way.
 
+#![forbid(unsafe_code)]
+
 mod diagnose;
 mod emit;
 pub mod include;
