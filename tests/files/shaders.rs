@@ -7,15 +7,18 @@ use std::{fs, path::Path, process::Command};
 const UNCHECKED: Options = Options { bounds: Bounds::Unchecked, debug: false };
 const CHECKED: Options = Options { bounds: Bounds::Checked, debug: true };
 
+/// Kernels lie in rooms; what they include is named from the folder of these.
+const ROOM: &str = "room";
+
 fn folder() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/spirv"))
 }
 
-/// A folder with these files in it.
+/// A folder with these files in it, in a room of it unless they name one.
 fn files(list: &[(&str, &str)]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in list {
-        let path = folder.path().join(name);
+        let path = folder.path().join(if name.contains('/') { "" } else { ROOM }).join(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, text).unwrap();
     }
@@ -24,7 +27,7 @@ fn files(list: &[(&str, &str)]) -> tempfile::TempDir {
 
 fn compile_main(list: &[(&str, &str)]) -> Result<Shader, String> {
     let folder = files(list);
-    compile::file(&folder.path().join("main.wgsl"), UNCHECKED)
+    compile::file(&folder.path().join(ROOM).join("main.wgsl"), UNCHECKED)
 }
 
 fn compile_text(wgsl: &str) -> Result<Shader, String> {
@@ -114,7 +117,7 @@ fn reflection_says_what_each_entry_point_touches() {
     assert_valid(&s, "SAMPLER");
     let folder = files(&[("main.wgsl", SAMPLER)]);
     assert_valid(
-        &compile::file(&folder.path().join("main.wgsl"), CHECKED).unwrap(),
+        &compile::file(&folder.path().join(ROOM).join("main.wgsl"), CHECKED).unwrap(),
         "SAMPLER with bounds checks",
     );
     let names: Vec<_> = s.bindings.iter().map(|b| (b.binding, b.name.as_str())).collect();
@@ -264,8 +267,8 @@ fn an_include_cycle_is_refused_at_the_line_that_closes_it() {
 
 #[test]
 fn lines_map_back_through_includes() {
-    let folder = files(&[("main.wgsl", "a\n#include \"x.wgsl\"\nb\n"), ("x.wgsl", "c\nd\n")]);
-    let source = Source::read(&folder.path().join("main.wgsl")).unwrap();
+    let folder = files(&[("main.wgsl", "a\n#include \"shared/x.wgsl\"\nb\n"), ("shared/x.wgsl", "c\nd\n")]);
+    let source = Source::read(&folder.path().join(ROOM).join("main.wgsl")).unwrap();
     assert_eq!(source.text, "a\nc\nd\nb\n");
     let origin = |line| {
         source.origin(line).map(|(path, n)| (path.file_name().unwrap().to_str().unwrap().to_owned(), n))

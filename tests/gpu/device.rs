@@ -6,10 +6,11 @@ use cao_testing::wgsl::{bind, compile, device_buffer};
 use cao_testing::{close, open};
 use std::process::Command;
 
-/// Runs one ignored test of this file in a process of its own, with these variables in its environment.
+/// Runs one ignored test of this module in a process of its own, with these variables in its environment.
 fn in_environment(test: &str, variables: &[(&str, &str)]) {
+    let (_executable, module) = module_path!().split_once("::").unwrap();
     let output = Command::new(std::env::current_exe().unwrap())
-        .args(["--ignored", "--exact", test])
+        .args(["--ignored", "--exact", &format!("{module}::{test}")])
         .envs(variables.iter().copied())
         .output()
         .unwrap();

@@ -15,7 +15,7 @@ use cao_twin::Grid;
 
 /// Each ray's contribution is rounded to 1/65535 once: half a unit, times the rays, is the worst.
 const ROUNDING: f64 = 0.5 / 65535.0;
-/// Rounding of `exp` and `log` along a ray, and of a segment's closed form, relative; see tests/lao.rs.
+/// Rounding of `exp` and `log` along a ray, and of a segment's closed form, relative; see `kernels::lao`.
 const FUNCTIONS: f64 = 1e-5;
 
 struct Bench<'a> {

@@ -6,8 +6,8 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/peers");
-const ARGUMENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tools/peers.d/arguments.py");
+const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tools/peers");
+const ARGUMENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tools/peers.d/arguments.py");
 
 /// Exit code, standard output, standard error.
 fn run(command: &mut Command) -> (Option<i32>, String, String) {

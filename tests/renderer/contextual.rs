@@ -15,7 +15,7 @@ use cao_twin as twin;
 use cao_twin::Grid;
 use glam::Vec3;
 
-/// Error of an ambient value of a few samples a ray: positions and filter as in `tests/lao.rs`, functions of a software
+/// Error of an ambient value of a few samples a ray: positions and filter as in `kernels::lao`, functions of a software
 /// driver to 1e-5.
 fn tolerance(gpu: &Gpu, occlusion: &Occlusion, smallest: f64) -> f64 {
     f64::from(occlusion.samples(smallest)).sqrt() * (1e-5 + filter_error(gpu)) + 1e-5
