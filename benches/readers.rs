@@ -1,6 +1,6 @@
 //! Reading volumes: every format, from the page cache. 96³ values of 16 bits, 1.7 MiB.
 
-mod common;
+#![forbid(unsafe_code)]
 
 use cao_formats::write_nrrd;
 use cao_model::values::Values;
@@ -90,5 +90,5 @@ fn readers(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group! { name = benches; config = common::brief(); targets = readers }
+criterion_group! { name = benches; config = cao_benches::brief(); targets = readers }
 criterion_main!(benches);

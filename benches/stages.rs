@@ -1,7 +1,7 @@
 //! Kernels, by the device's timestamps: the time that a stage takes inside an update or a frame, not that of the calls
 //! around it. 32³ voxels, 8 voxels radius, 128² pixels for each eye. On a software driver only ratios mean anything.
 
-mod common;
+#![forbid(unsafe_code)]
 
 use cao::glam::Vec3;
 use cao::renderer::COLOUR;
@@ -136,5 +136,5 @@ fn stages(criterion: &mut Criterion) {
     bench.group.finish();
 }
 
-criterion_group! { name = benches; config = common::brief(); targets = stages }
+criterion_group! { name = benches; config = cao_benches::brief(); targets = stages }
 criterion_main!(benches);

@@ -2,18 +2,18 @@
 //! are compared with (method.md §4). Prints the median of the runs and their range, for each set of vector instructions
 //! that the processor has; `Target` is what the crate is built for.
 
-mod simd;
+#![forbid(unsafe_code)]
 
-use cao::RaySet;
-use simd::{Rule, Vectors, lines, sweep};
+use cao_model::occlusion::RaySet;
+use cao_simd::{Rule, Vectors, lines, sweep};
 use std::time::Instant;
 
 const EDGE: usize = 128;
 const RUNS: usize = 15;
 
-fn main() -> cao::Result<()> {
+fn main() -> cao_formats::Result<()> {
     let volume = cao_formats::open(&format!("builtin:engine:{EDGE}"))?;
-    let transfer = cao::cao_formats::transfer::load("auto", volume.range())?;
+    let transfer = cao_formats::transfer::load("auto", volume.range())?;
     let q: Vec<f32> = (0..volume.len()).map(|i| 1.0 - transfer.opacity_at(volume.value(i) as f32)).collect();
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let rays = RaySet::W26.directions();

@@ -1,14 +1,13 @@
 //! The CPU twins, which tests wait for. 24³ voxels, 6 voxels radius.
 
-mod common;
+#![forbid(unsafe_code)]
 
-use cao::glam::Vec3;
-use cao::{
-    Clip, Occlusion, Pose, Quadrature, RaySet, Scene, Shape, StereoRig, TransferFunction, TriangleMesh,
-};
-use cao_formats::scene::VolumeSource;
+use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::glam::Vec3;
 use cao_model::look::Look;
-use cao_model::occlusion::Integral;
+use cao_model::mesh::TriangleMesh;
+use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_model::view::StereoRig;
 use cao_twin as twin;
 use cao_twin::Grid;
 use cao_twin::clip::clips::{ClipField, Dilation, Maps};
@@ -40,7 +39,6 @@ fn twins(criterion: &mut Criterion) {
     let (clipped, mask) = twin::clip::classify::classify(&grid, &opacity, &clips, 32);
     let unclipped = twin::cast::lao::lao(&grid, &opacity, &occlusion, reference_mm);
     let ambient: Vec<f32> = unclipped.iter().map(|a| *a as f32).collect();
-    let look = Scene::default_for(VolumeSource::parse(&name));
     let view = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 1.0, 1e3).expect("views")[0];
     let frame = Frame {
         grid,
@@ -51,7 +49,7 @@ fn twins(criterion: &mut Criterion) {
         ambient: &ambient,
         clips: &clips,
         step_mm: 0.5,
-        shading: Look { occlusion: true, ..look.shading },
+        look: Look::default(),
     };
     let size = [48; 2];
     let image = twin::draw::raycast::raycast(&frame, &view, size);
@@ -97,5 +95,5 @@ fn twins(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group! { name = benches; config = common::brief(); targets = twins }
+criterion_group! { name = benches; config = cao_benches::brief(); targets = twins }
 criterion_main!(benches);

@@ -1,5 +1,7 @@
 //! What the Criterion benches share.
 
+#![forbid(unsafe_code)]
+
 use criterion::Criterion;
 use std::time::Duration;
 

@@ -1,0 +1,10 @@
+//! Tests that need no device: files in and out, plain data, the kernels' compiler, the rules of the house.
+
+mod builtin;
+mod house;
+mod mesh;
+mod scene;
+mod shaders;
+mod sweep_simd;
+mod transfer;
+mod volume_files;

@@ -1,0 +1,7 @@
+//! Tests of the Vulkan layer by itself, with kernels of their own.
+
+mod device;
+mod draw;
+mod hazard;
+mod resources;
+mod shaders;

@@ -1,0 +1,234 @@
+//! The kernel `carve` against `classify`, which is held to its twin, and against its own: opacity in place, where it lies, what
+//! changed.
+
+use cao::cast::volumes::volume_image;
+use cao::clip::classify::Classify;
+use cao::clip::clip_bricks::ClipBricks;
+use cao::clip::clips::ClipSet;
+use cao::clip::dilate::Dilate;
+use cao::clip::peel::Peel;
+use cao::field::Field;
+use cao::field::bricks::BrickList;
+use cao::field::occupancy::Occupancy;
+use cao::field::opacity::Opacity;
+use cao::field::transfer::TransferBuffer;
+use cao::sweep::carve::{Bindings, Carve};
+use cao::sweep::near::{CHANGED, FAR};
+use cao::sweep::past::PastBricks;
+use cao_gpu::{Access, Buffer, Format, Gpu, Image};
+use cao_measure::random::Random;
+use cao_model::clip::Clip;
+use cao_model::settings::AntiAliasing;
+use cao_model::settings::MapSettings;
+use cao_model::transfer::TransferFunction;
+use cao_testing::*;
+use cao_twin::Grid;
+use cao_twin::field::bricks::bricks;
+use cao_twin::sweep::carve::{changed, contact, stored};
+use std::collections::BTreeSet;
+
+const MAPS: MapSettings = MapSettings { resolution: 128, cells: 32, pairs: 4, literal: false };
+
+struct Bench<'a> {
+    gpu: &'a Gpu,
+    field: Field,
+    set: ClipSet,
+    half_mm: f32,
+    transfer: TransferBuffer,
+    words: [Buffer; 3],
+    occupancy: Buffer,
+    contact: Buffer,
+    change: Buffer,
+    list: BrickList,
+    todo: Buffer,
+    past: PastBricks,
+    opacity: Image,
+    full: Image,
+    clipped: Image,
+    mask: Image,
+}
+
+impl<'a> Bench<'a> {
+    fn new(gpu: &'a Gpu, grid: &Grid, values: Vec<f32>) -> Self {
+        let field = Field::upload(gpu, &volume_of(grid, values)).unwrap();
+        let zeros = |name| buffer(gpu, name, &vec![0; 4 * field.brick_count() as usize]);
+        let image = |name, format| {
+            let image = volume_image(gpu, name, &field, format).unwrap();
+            let bytes = grid.len() * format.bytes() as usize;
+            write_image(gpu, &image, &vec![0; bytes]);
+            image
+        };
+        Self {
+            set: ClipSet::new(gpu).unwrap(),
+            half_mm: 0.5 * size_mm(grid).length(),
+            transfer: TransferBuffer::new(gpu).unwrap(),
+            words: [zeros("now"), zeros("before"), zeros("for classify")],
+            occupancy: zeros("occupancy"),
+            contact: zeros("contact"),
+            change: zeros("change"),
+            list: BrickList::new(gpu, &field).unwrap(),
+            todo: zeros("todo"),
+            past: PastBricks::new(gpu, &field).unwrap(),
+            opacity: image("opacity", Format::R16Unorm),
+            full: image("full", Format::R32Float),
+            clipped: image("clipped", Format::R32Float),
+            mask: image("mask", Format::R8Uint),
+            gpu,
+            field,
+        }
+    }
+
+    /// Runs both kernels; `transfer` only where it changed.
+    fn run(
+        &mut self,
+        kernels: &Kernels,
+        transfer: Option<&TransferFunction>,
+        clips: &[Clip],
+        samples: AntiAliasing,
+    ) {
+        let Kernels { classify, clip_bricks, carve, opacity, occupancy, peel, dilate } = kernels;
+        self.set.prepare(self.gpu, peel, dilate, clips, 1.0, self.half_mm, MAPS).unwrap();
+        let between = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
+        run(self.gpu, |rec| {
+            let count = &classify.count;
+            rec.fill(count, 0, count.bytes(), 0).unwrap();
+            rec.fill(&self.change, 0, self.change.bytes(), FAR).unwrap();
+            if let Some(transfer) = transfer {
+                self.transfer.record(rec, transfer).unwrap();
+                occupancy.record(rec, &self.field, &self.transfer, &self.occupancy).unwrap();
+            }
+            opacity.record(rec, &self.field, &self.transfer, &self.full).unwrap();
+            self.set.record(rec, clips, self.half_mm).unwrap();
+            clip_bricks.record(rec, &self.field, &self.set, 0.0, &self.words[0]).unwrap();
+            clip_bricks.record(rec, &self.field, &self.set, 1.0, &self.words[2]).unwrap();
+            rec.barrier(&[Access::StorageWrite, Access::TransferWrite], &between);
+            let b = Bindings {
+                transfer: &self.transfer,
+                clips: &self.set,
+                clip_bricks: &self.words[0],
+                clip_bricks_before: &self.words[1],
+                occupancy: &self.occupancy,
+                contact: &self.contact,
+                change: &self.change,
+                list: &self.list,
+                todo: &self.todo,
+                past: &self.past,
+                opacity: &self.opacity,
+            };
+            carve.record(rec, &self.field, samples, transfer.is_some(), classify, b).unwrap();
+            let (set, words) = (&self.set, &self.words[2]);
+            let (full, clipped, mask) = (&self.full, &self.clipped, &self.mask);
+            classify.record(rec, &self.field, set, samples, 1.0, false, words, full, clipped, mask).unwrap();
+        });
+    }
+
+    fn opacity(&self) -> Vec<u16> {
+        bytemuck::pod_collect_to_vec(&read_image(self.gpu, &self.opacity))
+    }
+}
+
+struct Kernels {
+    classify: Classify,
+    clip_bricks: ClipBricks,
+    carve: Carve,
+    opacity: Opacity,
+    occupancy: Occupancy,
+    peel: Peel,
+    dilate: Dilate,
+}
+
+impl Kernels {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            classify: Classify::new(gpu).unwrap(),
+            clip_bricks: ClipBricks::new(gpu).unwrap(),
+            carve: Carve::new(gpu).unwrap(),
+            opacity: Opacity::new(gpu).unwrap(),
+            occupancy: Occupancy::new(gpu).unwrap(),
+            peel: Peel::new(gpu).unwrap(),
+            dilate: Dilate::new(gpu).unwrap(),
+        }
+    }
+}
+
+#[test]
+fn opacity_in_place_equals_classification_after_every_edit_and_changes_are_found() {
+    let gpu = open();
+    let kernels = Kernels::new(&gpu);
+    let mut random = Random::new(71);
+    let shapes = shapes();
+    let (mut bricks_changed, mut bricks_kept) = (0, 0);
+    for grid in
+        [Grid { dims: [41, 30, 19], spacing: [1.0, 0.8, 1.3] }, Grid { dims: [9, 1, 33], spacing: [1.0; 3] }]
+    {
+        let values = opacities(&mut random, &grid, 1.0);
+        let mut bench = Bench::new(&gpu, &grid, values);
+        let mut before = bench.opacity();
+        for step in 0..40 {
+            let transfer = (step % 5 == 0).then(|| {
+                let (low, top) = (random.between(0.0, 0.7), random.between(0.2, 1.0));
+                TransferFunction::new(vec![[low, 0.0], [low + 0.2, top]], vec![[0.0, 1.0, 1.0, 1.0]], None)
+                    .unwrap()
+            });
+            let clips: Vec<Clip> = (0..random.below(4))
+                .map(|_| {
+                    let shape = &shapes[random.below(shapes.len() as u64) as usize];
+                    random_clip(&mut random, shape, size_mm(&grid))
+                })
+                .collect();
+            let samples = [AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][step % 3];
+            bench.run(&kernels, transfer.as_ref(), &clips, samples);
+            let after = bench.opacity();
+            for (i, expected) in read_floats(&gpu, &bench.clipped).into_iter().enumerate() {
+                // Both kernels run the same functions; only a half of 1/65535 may round to either side.
+                let difference = (f64::from(expected) * 65535.0 - f64::from(after[i])).abs();
+                assert!(difference <= 0.5 + 1e-2, "step {step} {:?}: {difference}, {clips:?}", grid.voxel(i));
+            }
+            let bits: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &bench.contact));
+            assert_eq!(bits, contact(&grid, &after), "step {step}");
+            let found: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &bench.change));
+            let expected = changed(&grid, &before, &after);
+            assert!(
+                found.iter().zip(&expected).all(|(d, octants)| (*d == 0.0) == (*octants != 0)),
+                "step {step}"
+            );
+            let octants: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &bench.todo));
+            assert_eq!(
+                octants.iter().map(|word| word / CHANGED).collect::<Vec<_>>(),
+                expected,
+                "step {step}"
+            );
+            assert!(octants.iter().all(|word| word % CHANGED == 0), "step {step}");
+            bricks_changed += expected.iter().filter(|octants| **octants != 0).count();
+            bricks_kept += expected.iter().filter(|octants| **octants == 0).count();
+
+            // Changed bricks are listed once, with what they held.
+            let list: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &bench.past.list.buffer));
+            let past: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &bench.past.opacities));
+            let all = bricks(&grid);
+            let count = list[3] as usize;
+            assert_eq!(count, expected.iter().filter(|octants| **octants != 0).count());
+            // More are counted only.
+            let count = count.min(bench.past.capacity as usize);
+            assert_eq!(list[..3], [count as u32, u32::from(count > 0), 1]);
+            let listed: BTreeSet<u32> = list[4..4 + count].iter().copied().collect();
+            assert_eq!(listed.len(), count);
+            for (slot, brick) in list[4..4 + count].iter().map(|brick| *brick as usize).enumerate() {
+                assert!(expected[brick] != 0);
+                let first = all.voxel(brick).map(|c| c * 8);
+                for n in 0..512 {
+                    let voxel = std::array::from_fn(|axis| first[axis] + [n % 8, n / 8 % 8, n / 64][axis]);
+                    if (0..3).all(|axis| voxel[axis] < grid.dims[axis]) {
+                        let word = past[256 * slot + n % 256] >> (16 * (n / 256));
+                        assert_eq!(word as u16, before[grid.index(voxel)], "step {step} {voxel:?}");
+                    }
+                }
+            }
+            before = after;
+        }
+    }
+    assert!(bricks_changed > 200 && bricks_kept > 200, "{bricks_changed} {bricks_kept}");
+    assert_eq!(stored(1.0), 65535);
+    drop(kernels);
+    close(gpu);
+}

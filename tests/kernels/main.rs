@@ -1,0 +1,19 @@
+//! Each kernel against its twin: one module a kernel, under its name.
+
+mod brick_distance;
+mod bricks;
+mod carve;
+mod classify;
+mod clip_bricks;
+mod dilate;
+mod lao;
+mod near;
+mod occupancy;
+mod opacity;
+mod past;
+mod peel;
+mod raycast;
+mod reference;
+mod ssao;
+mod sweep;
+mod sweep_list;

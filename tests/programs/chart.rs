@@ -1,0 +1,339 @@
+//! `cao chart`: every method after every kind of change, in numbers, drawings and a page that stands alone.
+
+use crate::support::Folder;
+use cao_measure::chart::peers::Peers;
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, measure, report};
+use cao_measure::contender::{BASELINE, Change, State};
+use cao_measure::reference;
+use cao_model::builtin::builtin;
+use cao_model::occlusion::Quadrature;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+use cao_testing::{close, open};
+use std::collections::BTreeMap;
+
+const METHODS: [&str; 7] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO", "sweep"];
+const RUNS: u32 = 2;
+
+fn scene(name: &str) -> Scene {
+    let volume = builtin(name, 18).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let rig = StereoRig::framing(volume.size_mm(), 30.0, 25.0);
+    let state = State { clips: vec![Scene::default_clip(&volume)], transfer, radius_mm: 5.0 };
+    Scene { name: format!("builtin:{name}:18"), volume, state, rig }
+}
+
+fn plan() -> Plan {
+    let reference = reference::Plan { directions: 200, steps_per_voxel: 4, max_voxels: 300 };
+    Plan { quick: true, runs: RUNS, size: [64, 48], reference }
+}
+
+/// Measured once, for it takes seconds; what has to hold of it is in the functions that this calls.
+#[test]
+fn every_method_is_charted_and_what_the_chart_says_holds() {
+    let gpu = open();
+    let mut shares = Vec::new();
+    let scenes = [scene("engine"), scene("fruit")];
+    let chart = measure(&gpu, &scenes, &plan(), &mut |_, share| shares.push(share)).unwrap();
+    close(gpu);
+    assert!(shares.is_sorted() && *shares.last().unwrap() <= 1.0, "{shares:?}");
+    assert!(shares.last().unwrap() > &0.8, "work that nobody counted: {shares:?}");
+
+    every_run_of_every_method_and_change_is_a_record_whose_parts_fit_together(&chart);
+    errors_are_in_the_order_that_the_methods_promise(&chart);
+    the_front_of_each_panel_is_beaten_by_nothing_and_beats_all_else(&chart);
+    drawings_are_well_formed_and_show_every_method_and_change(&chart);
+    the_report_stands_alone_and_has_every_part(&chart);
+}
+
+/// Records of RFC 4180, by the names of the first.
+fn records(text: &str) -> Vec<BTreeMap<String, String>> {
+    let mut rows = vec![vec![String::new()]];
+    let mut quoted = false;
+    for c in text.strip_suffix("\r\n").unwrap().replace("\r\n", "\n").chars() {
+        let row = rows.last_mut().unwrap();
+        match c {
+            '"' => quoted = !quoted,
+            ',' if !quoted => row.push(String::new()),
+            '\n' if !quoted => rows.push(vec![String::new()]),
+            c => row.last_mut().unwrap().push(c),
+        }
+    }
+    let names = rows.remove(0);
+    rows.into_iter()
+        .map(|row| {
+            assert_eq!(row.len(), names.len(), "{row:?}");
+            names.iter().cloned().zip(row).collect()
+        })
+        .collect()
+}
+
+/// Every element closed by its own name; attributes quoted. Void elements of HTML may stay open.
+fn well_formed(text: &str) -> Result<(), String> {
+    const VOID: [&str; 2] = ["meta", "img"];
+    let mut open: Vec<String> = Vec::new();
+    let mut rest = text;
+    while let Some((before, tag)) = rest.split_once('<') {
+        if before.contains('>') && !open.iter().any(|name| name == "style") {
+            return Err(format!("a loose > in {before:?}"));
+        }
+        if let Some(comment) = tag.strip_prefix("!--") {
+            rest = comment.split_once("-->").ok_or("an open comment")?.1;
+            continue;
+        }
+        let (tag, after) = tag.split_once('>').ok_or_else(|| format!("an open tag {tag:?}"))?;
+        rest = after;
+        if tag.matches('"').count() % 2 == 1 {
+            return Err(format!("quotes of <{tag}>"));
+        }
+        let name = |tag: &str| tag.split([' ', '/']).find(|s| !s.is_empty()).unwrap_or_default().to_owned();
+        if tag.starts_with('!') || tag.starts_with('?') || tag.ends_with('/') {
+            continue;
+        }
+        match tag.strip_prefix('/') {
+            Some(closed) => match open.pop() {
+                Some(opened) if opened == closed => {}
+                other => return Err(format!("</{closed}> closes {other:?}")),
+            },
+            None if VOID.contains(&name(tag).as_str()) => {}
+            None => open.push(name(tag)),
+        }
+    }
+    if open.is_empty() { Ok(()) } else { Err(format!("{open:?} stay open")) }
+}
+
+fn every_run_of_every_method_and_change_is_a_record_whose_parts_fit_together(chart: &Chart) {
+    let records = records(&csv::runs(chart));
+    let number = |record: &BTreeMap<String, String>, name: &str| -> f64 {
+        record[name].parse().unwrap_or_else(|_| panic!("{name}: {:?}", record[name]))
+    };
+    for scene in ["builtin:engine:18", "builtin:fruit:18"] {
+        for change in Change::ALL.map(Change::name) {
+            for method in METHODS {
+                let own: Vec<_> = records
+                    .iter()
+                    .filter(|r| r["scene"] == scene && r["change"] == change && r["method"] == method)
+                    .collect();
+                assert!(
+                    !own.is_empty() && own.len().is_multiple_of(RUNS as usize),
+                    "{scene} {change} {method}"
+                );
+                for record in own {
+                    let stages: f64 = record
+                        .iter()
+                        .filter(|(name, value)| {
+                            name.ends_with("_ms") && *name != "total_ms" && !value.is_empty()
+                        })
+                        .map(|(_, value)| value.parse::<f64>().unwrap())
+                        .sum();
+                    assert!(
+                        (stages - number(record, "total_ms")).abs() < 1e-9 * stages.max(1.0),
+                        "{record:?}"
+                    );
+                    assert_eq!(stages > 0.0, method != "solid colour", "{record:?}");
+                    assert!(!record["total_ms"].starts_with('-'), "{record:?}");
+                    let (rmse, max) = (number(record, "rmse"), number(record, "max"));
+                    assert!(rmse > 0.0 && rmse <= max && max <= 1.0, "{record:?}");
+                    assert!(number(record, "bias").abs() <= rmse && number(record, "rmse_shape") <= rmse);
+                    if method == BASELINE && record["setting"] == "26 left" {
+                        assert_eq!(record["ratio"], "1");
+                    }
+                    // Image space has values on the surface only.
+                    assert_eq!(record["ssim3d"].is_empty(), method == "image space");
+                    assert_eq!(record["errors_at"] == "surface", method == "image space");
+                }
+            }
+        }
+    }
+}
+
+fn errors_are_in_the_order_that_the_methods_promise(chart: &Chart) {
+    for point in chart.scenes.iter().flat_map(|scene| &scene.points) {
+        let scene = chart.scenes.iter().find(|s| s.points.iter().any(|p| std::ptr::eq(p, point))).unwrap();
+        let other = |method: &str, name: &str| {
+            let same = |p: &&cao_measure::chart::Point| {
+                p.change == point.change && p.method == method && p.setting.name() == name
+            };
+            scene.points.iter().find(same).unwrap_or_else(|| panic!("{method} {name}"))
+        };
+        let context = format!("{} {:?} {} {}", scene.name, point.change, point.method, point.setting.name());
+        // Any method beats none at all.
+        let solid = other("solid colour", "-");
+        assert!(point.method == "solid colour" || point.errors.rmse < solid.errors.rmse, "{context}");
+        match point.method {
+            // Bit for bit what a full recomputation gives.
+            "CAO" => assert_eq!(point.errors, other("LAO", &point.setting.name()).errors, "{context}"),
+            "LAO" if point.setting.quadrature == Some(Quadrature::Left) && point.setting.label == "26" => {
+                assert_eq!(point.errors, other(BASELINE, "26 left").errors, "{context}");
+            }
+            // Voxels that its maps leave stale are never nearer to the truth by much.
+            "CAO literal" => {
+                let fresh = other(BASELINE, &point.setting.name()).errors.rmse;
+                assert!(point.errors.rmse > 0.9 * fresh && point.errors.rmse < 2.0 * fresh, "{context}");
+            }
+            _ => {}
+        }
+        if point.setting.name() == "50w segment" {
+            assert!(point.errors.rmse < 0.7 * other(BASELINE, "26 left").errors.rmse, "{context}");
+        }
+    }
+    for scene in &chart.scenes {
+        for (change, truth) in &scene.references {
+            assert!(truth.computed > 50 && truth.computed <= truth.counting, "{} {change:?}", scene.name);
+            assert!(truth.surface > 50 && truth.convergence < 0.01, "{} {change:?} {truth:?}", scene.name);
+        }
+        let affected = f64::from(scene.categories.affected) / 18.0_f64.powi(3);
+        assert!((0.05..0.8).contains(&affected), "{}: {affected}", scene.name);
+        assert!(scene.recomputed > 0.0 && scene.recomputed < 1.0, "{}: {}", scene.name, scene.recomputed);
+    }
+}
+
+fn the_front_of_each_panel_is_beaten_by_nothing_and_beats_all_else(chart: &Chart) {
+    let scenes: Vec<_> = chart.scenes.iter().collect();
+    for change in Change::ALL {
+        let marks = draw::marks(&scenes, change, true);
+        let front = draw::front_of(&marks);
+        assert!(!front.is_empty());
+        for (i, mark) in marks.iter().enumerate() {
+            if mark.of.on_surface || mark.time[1] <= 0.0 {
+                assert!(!front.contains(&i), "{} does not compete", mark.of.method);
+                continue;
+            }
+            let beaten = front.iter().any(|&f| {
+                let f = &marks[f];
+                f.time[1] <= mark.time[1]
+                    && f.error <= mark.error
+                    && (f.time[1], f.error) != (mark.time[1], mark.error)
+            });
+            assert_eq!(
+                beaten,
+                !front.contains(&i),
+                "{change:?} {} {}",
+                mark.of.method,
+                mark.of.setting.name()
+            );
+        }
+    }
+}
+
+fn drawings_are_well_formed_and_show_every_method_and_change(chart: &Chart) {
+    let scenes: Vec<_> = chart.scenes.iter().collect();
+    let drawing = draw::draw(chart, &scenes, &chart.caption());
+    let svg = drawing.svg();
+    well_formed(&svg).unwrap();
+    for text in
+        METHODS.into_iter().chain(Change::ALL.map(Change::name)).chain(["builtin:fruit:18", "26 rays"])
+    {
+        assert!(svg.contains(text), "{text}");
+    }
+    let png = image::load_from_memory(&drawing.png().unwrap()).unwrap();
+    assert!(png.width() > 1500 && png.height() > 1200);
+
+    assert!(well_formed(&svg.replacen("</text>", "", 1)).is_err());
+    assert!(well_formed(&svg.replacen("</svg>", "</svg></g>", 1)).is_err());
+    assert!(well_formed(&svg.replacen("x=\"", "x=", 1)).is_err());
+}
+
+const PEERS: &str = r#"{"machine": "a <machine>", "volume": "v", "dims": [1, 2, 3], "image_size": [4, 5], "radius_mm": 6, "rounds": 7,
+    "rows": [{"system": "VTK", "what": "plain & simple", "median_ms": 8, "low": 7, "high": 9, "ratio_to_cao": 1.25}],
+    "stereo": {"rows": [{"what": "SSAO", "points": 10, "mean": 0.02, "p99": 0.1}]},
+    "clip_shadow": {"rows": [{"what": "floor", "mean_brightness": 130.2, "too_dark": 11, "floor_pixels": 12}]}, "notes": ["a note"]}"#;
+
+/// What a page would fetch.
+fn references(html: &str) -> Vec<&str> {
+    let quoted = ["src=\"", "href=\"", "url("].into_iter().flat_map(|how| html.split(how).skip(1));
+    let external = quoted.filter(|rest| !rest.starts_with("data:")).map(|rest| &rest[..rest.len().min(40)]);
+    external.chain(html.match_indices("http").map(|(at, _)| &html[at..(at + 20).min(html.len())])).collect()
+}
+
+fn the_report_stands_alone_and_has_every_part(chart: &Chart) {
+    let peers = Peers::parse(PEERS).unwrap();
+    let with = report::html(chart, "a machine", "cao chart -o <x>", Some(&peers)).unwrap();
+    well_formed(&with).unwrap();
+    assert_eq!(references(&with), [""; 0]);
+    assert_eq!(references("<img src=\"a.png\"> http://x <img src=\"data:,\">").len(), 2);
+    // Two pictures of each method.
+    assert_eq!(with.matches("data:image/png;base64,").count(), 2 * METHODS.len());
+    // As printed: a row of each of the paper's three tables.
+    for printed in ["Clustered histograms", "16.13", "272.846", "a machine", "cao chart -o &lt;x&gt;"] {
+        assert!(with.contains(printed), "{printed}");
+    }
+    assert!(with.contains("plain &amp; simple") && with.contains("a &lt;machine&gt;"));
+    let without = report::html(chart, "a machine", "cao chart", None).unwrap();
+    assert!(!without.contains("Peers") && with.contains("Peers"));
+}
+
+#[test]
+fn a_scene_that_shows_nothing_or_a_plan_that_measures_nothing_is_refused_by_name() {
+    let gpu = open();
+    let mut nothing = scene("engine");
+    nothing.state.transfer.opacity.iter_mut().for_each(|point| point[1] = 0.0);
+    let refused = |scene: &Scene, plan: &Plan| {
+        measure(&gpu, std::slice::from_ref(scene), plan, &mut |_, _| ()).unwrap_err().to_string()
+    };
+    let said = refused(&nothing, &plan());
+    assert!(said.contains("builtin:engine:18") && said.contains("no voxel has opacity"), "{said}");
+    let said = refused(&scene("engine"), &Plan { runs: 0, ..plan() });
+    assert!(said.contains("0 runs"), "{said}");
+    close(gpu);
+    let said = Peers::parse("{\"machine\": 3}").unwrap_err().to_string();
+    assert!(said.contains("peers.json"), "{said}");
+}
+
+const SCENE: &str = r#"
+volume = "builtin:engine:16x14x12"
+clip = [{ shape = "plane", rotate_deg = [0, 90, 0], translate_mm = [2, 0, 0] }]
+occlusion = { radius_mm = 3 }
+"#;
+
+#[test]
+fn the_program_writes_all_files_and_says_which() {
+    let folder = Folder::with_device();
+    folder.put("peers.json", PEERS).put("scene.toml", SCENE);
+    let answer = folder.json("chart scene.toml --quick --runs 1 --peers peers.json -o chart");
+    assert_eq!(answer["files"].as_array().unwrap().len(), 4);
+    let mut names: Vec<_> = std::fs::read_dir(folder.path("chart"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["chart.png", "chart.svg", "report.html", "runs.csv"]);
+    let points = answer["points"].as_array().unwrap();
+    for method in METHODS {
+        assert!(points.iter().any(|p| p["method"] == method), "{method}");
+    }
+    let report = std::fs::read_to_string(folder.path("chart/report.html")).unwrap();
+    // What the scene says, and not what is done where it says nothing.
+    assert!(report.contains("scene.toml: 16 x 14 x 12 voxels, radius 3 mm, clip plane"));
+    assert!(report.contains("plain &amp; simple"));
+    assert_eq!(references(&report), [""; 0]);
+}
+
+#[test]
+fn what_cannot_be_charted_is_refused_by_name_and_leaves_nothing() {
+    let folder = Folder::without_device();
+    folder.put("file", "").put("peers.json", "{}").put("noise.nrrd", "noise");
+    let before = folder.list();
+    for (arguments, code, part) in [
+        ("chart", 2, "--output"),
+        ("chart -o file", 2, "file: is a file, expected a folder"),
+        ("chart -o no/such/place", 1, "no/such/place"),
+        ("chart --runs 0 -o out", 2, "--runs"),
+        ("chart --radius-mm 0 -o out", 2, "--radius-mm"),
+        ("chart builtin:pear:16 -o out", 1, "pear"),
+        ("chart builtin:engine:16 builtin:engine:16 -o out", 2, "given twice"),
+        ("chart noise.nrrd -o out", 1, "noise.nrrd"),
+        ("chart absent.nrrd -o out", 1, "absent.nrrd"),
+        ("chart --peers absent.json -o out", 1, "absent.json"),
+        ("chart --peers peers.json -o out", 1, "peers.json"),
+        ("chart builtin:engine:16 --transfer shiny -o out", 1, "shiny"),
+        ("chart scene.toml --dims 4,4,4 --type uint8 -o out", 2, "--dims: the scene scene.toml"),
+        // Everything is well but for the device.
+        ("chart builtin:engine:16 -o out", 1, "Vulkan"),
+    ] {
+        let run = folder.run(arguments);
+        assert_eq!(run.code, Some(code), "{}: {}", run.line, run.err);
+        assert!(run.err.contains(part), "{}: {part:?} is not in {:?}", run.line, run.err);
+        assert_eq!((run.out.as_str(), folder.list()), ("", before.clone()), "{}", run.line);
+    }
+}

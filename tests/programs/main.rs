@@ -1,0 +1,8 @@
+//! The real programs, in folders of their own.
+
+mod chart;
+mod cli;
+mod cli_refusals;
+mod peers;
+mod stereo_bench;
+mod support;

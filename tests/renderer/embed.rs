@@ -1,0 +1,186 @@
+//! A host that records into its own command buffer gets what `update` and `draw` make, to the bit, and pays nothing for a
+//! frame in which nothing changed.
+
+use cao::renderer::{COLOUR, Renderer};
+use cao_gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse};
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::look::Look;
+use cao_model::mesh::TriangleMesh;
+use cao_model::methods::Method;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::view::StereoRig;
+
+use glam::Vec3;
+use std::sync::Arc;
+
+fn renderer(gpu: &Gpu, method: Method) -> Renderer {
+    let volume = cao_formats::open("builtin:engine:24").unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let setup = Setup { method, ..Setup::of(Method::Cao, volume.min_spacing()) };
+    Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap()
+}
+
+fn clip(shape: Shape, at: f32) -> Clip {
+    let pose = Pose { translate_mm: Vec3::splat(at), scale: Vec3::splat(6.0), ..Pose::default() };
+    Clip { shape, mode: Mode::Remove, pose }
+}
+
+#[test]
+fn recorded_updates_equal_updates_on_the_own_queue() {
+    let gpu = cao_testing::open();
+    let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+    for method in [Method::Cao, Method::Lao] {
+        let (mut hosted, mut own) = (renderer(&gpu, method), renderer(&gpu, method));
+        for clips in [
+            vec![],
+            vec![clip(Shape::Sphere, 5.0)],
+            vec![clip(Shape::Sphere, 4.0), clip(mesh.clone(), -3.0)],
+            vec![clip(mesh.clone(), 2.0)],
+        ] {
+            own.set_clips(&clips).unwrap();
+            own.update(&mut |_| ()).unwrap();
+
+            hosted.set_clips(&clips).unwrap();
+            let mut rec = gpu.recorder("host frame").unwrap();
+            hosted.record_update(&mut rec).unwrap();
+            let stages = rec.submit_and_wait().unwrap();
+            assert!(stages.iter().any(|(name, _)| name == "classify"), "{stages:?}");
+
+            assert_eq!(hosted.read_opacity().unwrap(), own.read_opacity().unwrap());
+            let bits =
+                |r: &Renderer| r.read_ambient().unwrap().into_iter().map(f32::to_bits).collect::<Vec<_>>();
+            assert_eq!(bits(&hosted), bits(&own), "{method:?}, {} clips", clips.len());
+        }
+        let mut rec = gpu.recorder("host frame").unwrap();
+        hosted.record_update(&mut rec).unwrap();
+        assert_eq!(rec.submit_and_wait().unwrap(), [], "nothing changed, so nothing runs");
+    }
+    cao_testing::close(gpu);
+}
+
+#[test]
+fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
+    let gpu = cao_testing::open();
+    let mut r = renderer(&gpu, Method::Cao);
+    let size = [24, 20];
+    let views = StereoRig::framing([24.0; 3], 30.0, 20.0).views(1.2, 1.0, 200.0).unwrap();
+    let target = |format| {
+        let usage = ImageUse::ATTACHMENT | ImageUse::SAMPLED;
+        let dims = [size[0], size[1], 1];
+        gpu.image("swapchain", &ImageDesc { dims, layers: 2, format, kind: ImageKind::D2, usage }).unwrap()
+    };
+    let (colour, depth) = (target(COLOUR), target(Format::D32Float));
+    let mut rec = gpu.recorder("host frame").unwrap();
+    rec.discard(&colour);
+    rec.discard(&depth);
+    rec.barrier(&[], &[Access::AttachmentWrite]);
+    r.record_update(&mut rec).unwrap();
+    r.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, size).unwrap();
+    let stages: Vec<_> = rec.submit_and_wait().unwrap().into_iter().map(|(name, _)| name).collect();
+    assert_eq!(stages.last().map(String::as_str), Some("raycast"), "{stages:?}");
+
+    let (drawn, _) = r.draw(&views, &Look::default(), size).unwrap();
+    let bytes = u64::from(size[0] * size[1]) * 16;
+    let back = gpu.buffer("back", bytes, cao_gpu::BufferUse::Readback).unwrap();
+    for eye in 0..2 {
+        let mut rec = gpu.recorder("read").unwrap();
+        rec.copy_image_to_buffer(&colour, eye, [0; 3], [size[0], size[1], 1], &back, 0).unwrap();
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+        rec.submit_and_wait().unwrap();
+        let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&back.read(0, bytes).unwrap());
+        assert_eq!(pixels, drawn.colour[eye as usize]);
+        assert!(pixels.iter().any(|p| p[3] > 0.9), "eye {eye} sees the volume");
+    }
+    drop((r, colour, depth, back));
+    cao_testing::close(gpu);
+}
+
+fn bits(values: Vec<f32>) -> Vec<u32> {
+    values.into_iter().map(f32::to_bits).collect()
+}
+
+#[test]
+fn a_frame_that_was_dropped_is_made_good_after_invalidate() {
+    let gpu = cao_testing::open();
+    for method in [Method::Cao, Method::Lao] {
+        let (mut hosted, mut own) = (renderer(&gpu, method), renderer(&gpu, method));
+        let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+        for (frame, clips) in [vec![clip(mesh.clone(), 2.0)], vec![clip(Shape::Box, 3.0), clip(mesh, -3.0)]]
+            .into_iter()
+            .enumerate()
+        {
+            hosted.set_clips(&clips).unwrap();
+            let mut dropped = gpu.recorder("dropped frame").unwrap();
+            hosted.record_update(&mut dropped).unwrap();
+            drop(dropped);
+            hosted.invalidate();
+            let times = hosted.update(&mut |_| ()).unwrap();
+            assert!(times.iter().any(|(name, _)| name == "opacity"), "everything runs again: {times:?}");
+            assert!(times.iter().all(|(name, _)| name != "peel"), "times of earlier frames: {times:?}");
+
+            own.set_clips(&clips).unwrap();
+            own.update(&mut |_| ()).unwrap();
+            assert_eq!(hosted.read_opacity().unwrap(), own.read_opacity().unwrap());
+            assert_eq!(hosted.read_mask().unwrap(), own.read_mask().unwrap());
+            let ambient = |r: &Renderer| bits(r.read_ambient().unwrap());
+            assert!(ambient(&hosted) == ambient(&own), "{method:?}, frame {frame}");
+        }
+    }
+    cao_testing::close(gpu);
+}
+
+#[test]
+fn what_is_out_of_date_is_neither_drawn_nor_read() {
+    let gpu = cao_testing::open();
+    let mut r = renderer(&gpu, Method::Cao);
+    let views = StereoRig::framing([24.0; 3], 30.0, 20.0).views(1.0, 1.0, 200.0).unwrap();
+    let look = Look::default();
+    let target = |format| {
+        let usage = ImageUse::ATTACHMENT | ImageUse::SAMPLED;
+        gpu.image("target", &ImageDesc { dims: [8, 8, 1], layers: 2, format, kind: ImageKind::D2, usage })
+            .unwrap()
+    };
+    let (colour, depth) = (target(COLOUR), target(Format::D32Float));
+    let uses = |r: &Renderer| -> Vec<(&str, Option<String>)> {
+        let mut rec = gpu.recorder("frame").unwrap();
+        rec.discard(&colour);
+        rec.discard(&depth);
+        let said = |result: cao::Result<()>| result.err().map(|error| error.to_string());
+        let uses = vec![
+            ("record_draw", said(r.record_draw(&mut rec, &views, &look, &colour, &depth, [8, 8]))),
+            ("draw", said(r.draw(&views, &look, [8, 8]).map(drop))),
+            ("verify", said(r.verify(&mut |_| ()).map(drop))),
+            ("seen_by_both", said(r.seen_by_both(&views, &look, &[Vec3::ZERO]).map(drop))),
+            ("read_ambient", said(r.read_ambient().map(drop))),
+            ("read_opacity", said(r.read_opacity().map(drop))),
+            ("read_mask", said(r.read_mask().map(drop))),
+        ];
+        rec.submit_and_wait().unwrap();
+        uses
+    };
+    type Change = fn(&mut Renderer);
+    let changes: [(&str, Change); 5] = [
+        ("new", |_| ()),
+        ("clips", |r| r.set_clips(&[clip(Shape::Sphere, 5.0)]).unwrap()),
+        ("transfer", |r| r.set_transfer(TransferFunction::preset("paper", (0.0, 255.0)).unwrap()).unwrap()),
+        ("setup", |r| {
+            let setup = Setup { method: Method::Lao, ..*r.setup() };
+            r.set_setup(setup).unwrap();
+        }),
+        ("invalidate", Renderer::invalidate),
+    ];
+    for (change, make) in changes {
+        make(&mut r);
+        for (name, error) in uses(&r) {
+            let error = error.unwrap_or_else(|| panic!("{name} after {change} must be refused"));
+            assert!(error.contains("ambient volume") && error.contains("update"), "{error}");
+        }
+        r.update(&mut |_| ()).unwrap();
+        for (name, error) in uses(&r) {
+            assert_eq!(error, None, "{name} after {change} and an update");
+        }
+    }
+    drop((r, colour, depth));
+    cao_testing::close(gpu);
+}

@@ -1,0 +1,12 @@
+//! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, leaks, budgets.
+
+mod adopt;
+mod consistency;
+mod contextual;
+mod embed;
+mod exactness;
+mod leaks;
+mod planner;
+mod real_data;
+mod stability;
+mod sweep_edits;

@@ -1,0 +1,170 @@
+//! Each sweep of `cao stability`: ours holds where it says so, and the method that fails there is caught failing. Small plans; the
+//! sizes of the charts are the program's.
+
+use cao_measure::stability::{
+    Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, radius, sheets, stereo,
+    views,
+};
+use cao_testing::{close, open};
+
+/// Ours holds, the control fails, and what is drawn are numbers.
+fn assert_shown(finding: &Finding) {
+    assert_eq!(finding.ours, Ours::Holds, "{}", finding.sentence);
+    assert!(finding.control_fails, "{}", finding.sentence);
+    for chart in &finding.charts {
+        assert!(chart.series.iter().any(|s| s.role == Role::Ours), "{}", chart.title);
+        for series in &chart.series {
+            let numbers = series.points.iter().flatten().all(|v| v.is_finite());
+            assert!(numbers && !series.points.is_empty(), "{}: {series:?}", chart.title);
+        }
+    }
+}
+
+/// The curve of chart `n` whose name begins so.
+fn curve<'a>(finding: &'a Finding, n: usize, name: &str) -> &'a Series {
+    finding.charts[n].series.iter().find(|s| s.name.starts_with(name)).unwrap_or_else(|| panic!("no {name}"))
+}
+
+#[test]
+fn eyes_agree_in_data_space_and_not_in_image_space() {
+    let gpu = open();
+    let plan = stereo::Plan { edge: 32, pixels: 96, separations_mm: vec![0.0, 20.0, 63.0] };
+    let finding = stereo::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let image = curve(&finding, 0, "image space, mean");
+    assert_eq!(image.at(0.0), 0.0, "equal eyes have equal pictures");
+    assert!(image.at(20.0) > 0.005 && image.at(63.0) > 0.01, "{image:?}");
+    assert_eq!(curve(&finding, 0, "data space").largest(), 0.0);
+    // Between the points of the grid some differ: the claim is about those on it.
+    assert!(curve(&finding, 1, "data space (ours), any").largest() < 3.0);
+    close(gpu);
+}
+
+#[test]
+fn a_moving_clip_jumps_without_samples_and_settles_at_once() {
+    let gpu = open();
+    let plan = motion::Plan { edge: 24, pixels: 48, frames: 8, way: 1 };
+    let finding = motion::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    for chart in 0..2 {
+        let at = |name| curve(&finding, chart, name).at(0.125);
+        assert!(at("N = 0") > 2.0 * at("N = 32"), "chart {chart}: {} {}", at("N = 0"), at("N = 32"));
+    }
+    assert_eq!(curve(&finding, 2, "contextual").largest(), 0.0);
+    assert!(curve(&finding, 2, "progressive").largest() > 0.05);
+    close(gpu);
+}
+
+#[test]
+fn the_published_dilation_map_leaves_stale_voxels_at_every_size() {
+    let gpu = open();
+    let plan = dilation::Plan { edge: 24, resolutions: vec![64, 256], poses: 1 };
+    let finding = dilation::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    for name in ["eq. (4) as printed, 32", "eq. (4) as printed, 16"] {
+        assert!(curve(&finding, 0, name).points.iter().all(|p| p[1] > 0.0), "{name}: {}", finding.sentence);
+    }
+    for name in ["conservative (ours)", "conservative (ours), on the device"] {
+        assert_eq!(curve(&finding, 0, name).largest(), 0.0, "{name}");
+    }
+    close(gpu);
+}
+
+#[test]
+fn missing_layers_are_reported_and_not_cut_wrongly() {
+    let gpu = open();
+    let finding = concave::run(&gpu, &concave::Plan { resolution: 48, points: 24 }, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    // A comb of 4 keeps a quarter less of itself with each pair; a sphere needs one.
+    let comb = curve(&finding, 0, "comb of 4");
+    for (pairs, wrong) in [(1.0, 75.0), (2.0, 50.0), (3.0, 25.0), (4.0, 0.0)] {
+        assert!((comb.at(pairs) - wrong).abs() < 5.0, "{comb:?}");
+    }
+    assert_eq!(curve(&finding, 0, "sphere").largest(), 0.0);
+    assert!(curve(&finding, 0, "ours").largest() <= concave::SILHOUETTE);
+    close(gpu);
+}
+
+#[test]
+fn cut_faces_are_light_where_clipped_voxels_hold_one() {
+    let gpu = open();
+    let plan = cut::Plan {
+        edge: 24,
+        places: vec![0.5, 0.75],
+        points: 40,
+        directions: 150,
+        steps_per_voxel: 4,
+        pixels: 12,
+    };
+    let finding = cut::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let [literal, ours] =
+        ["clipped voxels hold 1, RMSE", "computed (ours), RMSE"].map(|n| curve(&finding, 0, n));
+    assert!(literal.at(0.5) > 3.0 * ours.at(0.5), "{}", finding.sentence);
+    assert!(curve(&finding, 0, "clipped voxels hold 1, mean").at(0.5) > 0.02, "{}", finding.sentence);
+    assert!(curve(&finding, 1, "clipped").largest() > 2.0 * curve(&finding, 1, "computed").largest());
+    close(gpu);
+}
+
+/// The one sweep in which ours fails as the paper's does: it is LAO, and says so.
+#[test]
+fn inner_layers_grow_dark_with_the_radius() {
+    let plan = radius::Plan { edge: 64, voxels: 40, radii: vec![4.0, 16.0, 48.0] };
+    let finding = radius::run(&plan, &mut |_| ()).unwrap();
+    let [rind, core] = ["rind", "core"].map(|name| curve(&finding, 0, name));
+    assert!(core.points.windows(2).all(|w| w[1][1] < w[0][1]), "{core:?}");
+    assert!(core.at(48.0) < 0.5 * core.at(4.0) && core.at(48.0) < rind.at(48.0), "{}", finding.sentence);
+    assert_eq!(finding.ours, Ours::Limited, "{}", finding.sentence);
+    assert!(finding.control_fails && finding.sentence.contains("ours included"), "{}", finding.sentence);
+    // Where the radius is small, inner layers are as light as the rind: the sweep can tell.
+    let near = radius::run(&radius::Plan { radii: vec![4.0, 6.0], ..plan }, &mut |_| ()).unwrap();
+    assert_eq!(near.ours, Ours::Holds, "{}", near.sentence);
+}
+
+#[test]
+fn thin_sheets_are_missed_by_few_rays_and_by_the_printed_sum() {
+    let plan = sheets::Plan { thicknesses: vec![0.5, 1.5, 3.0], orientations: 16, directions: 300 };
+    let finding = sheets::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    assert!(curve(&finding, 0, "6 rays").largest() > 4.0 * curve(&finding, 0, "50w").largest());
+    assert!(
+        curve(&finding, 1, "50w rays, left, step 1").largest() > 2.0 * curve(&finding, 0, "50w").largest()
+    );
+}
+
+#[test]
+fn rays_in_millimetres_do_not_add_to_the_bias_of_long_voxels() {
+    let plan = anisotropy::Plan { ratios: vec![1.0, 3.0, 8.0], walls: 3, directions: 300 };
+    let finding = anisotropy::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let voxels = curve(&finding, 0, "rays and steps in voxels");
+    let truth = curve(&finding, 0, "ambient integral");
+    assert!(voxels.at(1.0) < anisotropy::BIAS, "cubes are the same either way");
+    assert!(voxels.at(3.0) > truth.at(3.0) + 2.0 * anisotropy::BIAS, "{}", finding.sentence);
+}
+
+#[test]
+fn extreme_numbers_have_a_result_or_an_error() {
+    let gpu = open();
+    let plan = numbers::Plan { opacities: vec![0.0, 1e-6, 0.5, 1.0], radii: vec![2.0, 5.0] };
+    let finding = numbers::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    // One NaN spoils the voxels whose rays pass it with a sample to come: M − 1 on each of 26 rays.
+    assert_eq!(curve(&finding, 1, "eq. (2)").points, [[2.0, 26.0], [5.0, 4.0 * 26.0]]);
+    assert!(finding.setting.contains("NaN or infinite"), "{}", finding.setting);
+    close(gpu);
+}
+
+#[test]
+fn odd_eyes_see_no_holes_and_the_same_shading() {
+    let gpu = open();
+    let plan =
+        views::Plan { edge: 16, pixels: 48, distances: vec![0.0, 0.9, 1.1, 2.2], shifts: vec![0.0, 0.5] };
+    let finding = views::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    assert_eq!(curve(&finding, 0, "ours").largest(), 0.0);
+    assert_eq!(curve(&finding, 0, "rays that begin").at(0.0), 100.0);
+    assert_eq!(curve(&finding, 0, "rays that begin").at(2.2), 0.0);
+    assert!(curve(&finding, 1, "taken").at(0.0) <= views::SAME_RAYS, "not shifted is symmetric");
+    close(gpu);
+}

@@ -1,0 +1,212 @@
+//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`wgsl`] for tests that
+//! bring kernels of their own.
+
+#![forbid(unsafe_code)]
+
+pub mod wgsl;
+
+use cao::cast::volumes::volume_image;
+use cao::field::Field;
+use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
+use cao_measure::random::Random;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::mesh::TriangleMesh;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
+use cao_twin::Grid;
+use glam::Vec3;
+use std::fmt::Write as _;
+use std::sync::Arc;
+
+/// A device under core and synchronization validation. Tests end with [`close`].
+pub fn open() -> Gpu {
+    Gpu::open(&OpenOptions { validation: true, ..OpenOptions::default() })
+        .expect("these tests need Vulkan and its validation layer")
+}
+
+/// Asserts that nothing is left allocated and that the validation layer has nothing to say, also about the destruction
+/// of the device.
+pub fn close(gpu: Gpu) {
+    assert_eq!(gpu.memory_report(), [], "leaked");
+    let log = gpu.validation_log();
+    drop(gpu);
+    log.assert_clean().unwrap();
+}
+
+/// One voxel, one row, a sheet, odd, larger than a workgroup of 8x8x4 and than a brick, none of them cubic; spacings from
+/// equal to 1 : 4.
+pub const GRIDS: [Grid; 6] = [
+    Grid { dims: [1, 1, 1], spacing: [1.0; 3] },
+    Grid { dims: [13, 1, 1], spacing: [0.7, 1.0, 1.0] },
+    Grid { dims: [1, 9, 4], spacing: [1.0, 1.0, 2.5] },
+    Grid { dims: [7, 5, 3], spacing: [0.5, 1.0, 2.0] },
+    Grid { dims: [17, 8, 9], spacing: [1.0; 3] },
+    Grid { dims: [10, 19, 12], spacing: [1.25, 0.8, 1.0] },
+];
+
+/// How far a texture filter may be off in an interpolated value of a field that ranges over 0 ... 1, beside the rounding
+/// of the position: software drivers weight in f32; hardware weights have 8 bits (Vulkan's subTexelPrecisionBits), half a
+/// unit of 2^-8 on each of three axes.
+pub fn filter_error(gpu: &Gpu) -> f64 {
+    match gpu.info().kind {
+        DeviceKind::Cpu => 1e-6,
+        _ => 3.0 * 0.5 / 256.0,
+    }
+}
+
+/// Volume of f32 values.
+pub fn volume_of(grid: &Grid, values: Vec<f32>) -> Volume {
+    Volume::new(grid.dims, grid.spacing, Values::F32(values)).unwrap()
+}
+
+/// A field of this shape on the device whose data are of no interest.
+pub fn blank(gpu: &Gpu, grid: &Grid) -> Field {
+    Field::upload(gpu, &volume_of(grid, vec![0.0; grid.len()])).unwrap()
+}
+
+/// The shape of a volume, for the twins.
+pub fn grid_of(volume: &Volume) -> Grid {
+    Grid { dims: volume.dims, spacing: volume.spacing }
+}
+
+/// Data values are opacities, white.
+pub fn identity() -> TransferFunction {
+    TransferFunction::new(vec![[0.0, 0.0], [1.0, 1.0]], vec![[0.0, 1.0, 1.0, 1.0]], None).unwrap()
+}
+
+/// Runs commands and waits.
+pub fn run(gpu: &Gpu, commands: impl FnOnce(&mut Recorder)) {
+    let mut rec = gpu.recorder("test").unwrap();
+    commands(&mut rec);
+    rec.submit_and_wait().unwrap();
+}
+
+/// Device buffer with this content.
+pub fn buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Buffer {
+    let bytes = content.len() as u64;
+    let staging = gpu.buffer("staging", bytes, BufferUse::Upload).unwrap();
+    staging.write(0, content).unwrap();
+    let buffer = gpu.buffer(name, bytes, BufferUse::Device).unwrap();
+    run(gpu, |rec| rec.copy_buffer(&staging, 0, &buffer, 0, bytes).unwrap());
+    buffer
+}
+
+/// Content of a device buffer.
+pub fn read_buffer(gpu: &Gpu, buffer: &Buffer) -> Vec<u8> {
+    let back = gpu.buffer("read-back", buffer.bytes(), BufferUse::Readback).unwrap();
+    run(gpu, |rec| {
+        rec.copy_buffer(buffer, 0, &back, 0, buffer.bytes()).unwrap();
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+    });
+    back.read(0, buffer.bytes()).unwrap()
+}
+
+/// Content of a 3D image, x fastest.
+pub fn read_image(gpu: &Gpu, image: &Image) -> Vec<u8> {
+    let dims = image.desc().dims;
+    let bytes = dims.iter().map(|&d| u64::from(d)).product::<u64>() * image.desc().format.bytes();
+    let back = gpu.buffer("read-back", bytes, BufferUse::Readback).unwrap();
+    run(gpu, |rec| {
+        rec.copy_image_to_buffer(image, 0, [0; 3], dims, &back, 0).unwrap();
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+    });
+    back.read(0, bytes).unwrap()
+}
+
+/// Content of a 3D image of floats.
+pub fn read_floats(gpu: &Gpu, image: &Image) -> Vec<f32> {
+    bytemuck::pod_collect_to_vec(&read_image(gpu, image))
+}
+
+/// Overwrites a 3D image, x fastest.
+pub fn write_image(gpu: &Gpu, image: &Image, content: &[u8]) {
+    let staging = gpu.buffer("staging", content.len() as u64, BufferUse::Upload).unwrap();
+    staging.write(0, content).unwrap();
+    run(gpu, |rec| {
+        rec.discard(image);
+        rec.barrier(&[], &[Access::TransferWrite]);
+        rec.copy_buffer_to_image(&staging, 0, image, [0; 3], image.desc().dims).unwrap();
+    });
+}
+
+/// A 3D image of floats of the field's size.
+pub fn float_image(gpu: &Gpu, field: &Field, content: &[f32]) -> Image {
+    let image = volume_image(gpu, "test floats", field, Format::R32Float).unwrap();
+    write_image(gpu, &image, bytemuck::cast_slice(content));
+    image
+}
+
+/// A 3D image of bytes of the field's size.
+pub fn byte_image(gpu: &Gpu, field: &Field, content: &[u8]) -> Image {
+    let image = volume_image(gpu, "test bytes", field, Format::R8Uint).unwrap();
+    write_image(gpu, &image, content);
+    image
+}
+
+/// Random opacities, half of them 0, up to `largest`.
+pub fn opacities(random: &mut Random, grid: &Grid, largest: f32) -> Vec<f32> {
+    (0..grid.len()).map(|_| random.between(-largest, largest).max(0.0)).collect()
+}
+
+/// The same mesh by way of an OBJ file's text.
+pub fn through_obj(mesh: &TriangleMesh) -> TriangleMesh {
+    let mut text = String::new();
+    for v in &mesh.vertices {
+        writeln!(text, "v {} {} {}", v.x, v.y, v.z).unwrap();
+    }
+    for t in &mesh.triangles {
+        writeln!(text, "f {} {} {}", t[0] + 1, t[1] + 1, t[2] + 1).unwrap();
+    }
+    cao_formats::obj::parse(mesh.name.as_str(), &text).unwrap()
+}
+
+/// A convex mesh from an OBJ file: a ball of 320 triangles.
+pub fn convex() -> Arc<TriangleMesh> {
+    Arc::new(through_obj(&TriangleMesh::sphere(2)))
+}
+
+/// A concave mesh from an OBJ file: a torus that the clip camera sees from the side, which takes two layer pairs.
+pub fn concave() -> Arc<TriangleMesh> {
+    let mut torus = TriangleMesh::torus(24, 12);
+    torus.vertices.iter_mut().for_each(|v| *v = Vec3::new(v.z, v.x, v.y));
+    Arc::new(through_obj(&torus))
+}
+
+/// Several boxes in a row along the clip camera's axis: as many layer pairs as boxes.
+pub fn row_of_boxes(count: u32) -> TriangleMesh {
+    let cuboid = TriangleMesh::cuboid();
+    let mut positions = Vec::new();
+    let mut faces = Vec::new();
+    for n in 0..count {
+        let first = positions.len() as u32;
+        let moved = |v: &Vec3| Vec3::new(v.x, v.y, v.z * 0.3 + n as f32);
+        positions.extend(cuboid.vertices.iter().map(moved));
+        faces.extend(cuboid.triangles.iter().map(|t| t.map(|i| i + first)));
+    }
+    TriangleMesh::new("row of boxes", &positions, &faces).unwrap()
+}
+
+/// Every analytic shape, a convex and a concave mesh.
+pub fn shapes() -> Vec<Shape> {
+    Shape::ANALYTIC.into_iter().chain([convex(), concave()].map(Shape::Mesh)).collect()
+}
+
+/// A clip around a volume of this size in mm: of any scale from a fiftieth of it to more than all of it.
+pub fn random_clip(random: &mut Random, shape: &Shape, size: Vec3) -> Clip {
+    let largest = size.max_element();
+    let scale = largest * 0.02 * 50.0_f32.powf(random.between(0.0, 1.0));
+    let mut vector = |low, high| Vec3::from_array([(); 3].map(|()| random.between(low, high)));
+    let pose = Pose {
+        translate_mm: vector(-0.6, 0.6) * size,
+        rotate_deg: vector(-180.0, 180.0),
+        scale: vector(0.5, 1.5) * scale,
+    };
+    let mode = if random.below(5) < 3 { Mode::Remove } else { Mode::Keep };
+    Clip { shape: shape.clone(), mode, pose }
+}
+
+/// Edges of a volume in mm.
+pub fn size_mm(grid: &Grid) -> Vec3 {
+    Vec3::from_array(std::array::from_fn(|i| (grid.dims[i] as f64 * grid.spacing[i]) as f32))
+}
