@@ -33,6 +33,9 @@ struct Pixel {
 
 var<immediate> params: RaycastParams;
 
+// Vertices to draw.
+const CORNERS = 6u;
+
 // Two triangles that make a rectangle of the whole image: one large triangle would do, but the software driver of Mesa 22.3
 // forgets the view of triangles that are not half of an upright rectangle.
 @vertex

@@ -1,7 +1,8 @@
 // Bricks of voxels: their places, and compacted lists of them.
 
-// Voxels along the edge of a brick, and those of its slices that a workgroup of half a brick takes at once.
+// Voxels along the edge of a brick.
 const BRICK = 8u;
+// Slices of a brick that a workgroup of half a brick takes at once.
 const SLICES = BRICK / 2u;
 
 // Invocations of a workgroup that takes an item each.
