@@ -16,8 +16,9 @@ struct LaoParams {
     step: f32,
     // step / reference length of the opacity
     exponent: f32,
+    // LEFT, CELL, SEGMENT
     quadrature: u32,
-    // 0: every listed voxel is computed; 1: the mask decides; 2: only voxels that a sample with opacity interpolates
+    // BY_MASK, ONLY_NEEDED
     flags: u32,
     // first entry of the list to work on, for dispatches that take the list in parts
     base: u32,
@@ -25,19 +26,23 @@ struct LaoParams {
 
 struct Rays {
     // unit vector in mm space, weight; sum of weights 1
-    ray: array<vec4<f32>, 54>,
+    ray: array<vec4<f32>, MOST_RAYS>,
 }
 
 #include "shared/bricks.wgsl"
+#include "shared/categories.wgsl"
+#include "shared/rays.wgsl"
 #include "shared/segment.wgsl"
 
+// Of the listed voxels, the mask decides which are computed.
 const BY_MASK = 1u;
+// Only voxels that a sample with opacity interpolates.
 const ONLY_NEEDED = 2u;
+
+// Rules along a ray.
 const LEFT = 0u;
 const CELL = 1u;
-
-const CLIPPED = 0u;
-const AFFECTED = 1u;
+const SEGMENT = 2u;
 
 var<immediate> params: LaoParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
@@ -104,7 +109,7 @@ fn ray_segment(start: vec3<f32>, direction: vec3<f32>) -> f32 {
     var length = 0.5;
     for (var m = 1u; m <= params.samples; m++) {
         // Both ends opaque: nothing comes through.
-        if max(q0, q1) < 1e-6 {
+        if max(q0, q1) < OPAQUE {
             break;
         }
         let near = max(q0, 0.0);
@@ -197,14 +202,14 @@ fn value_at(voxel: vec3<u32>) -> f32 {
 }
 
 // One workgroup a brick; each invocation takes two slices.
-@compute @workgroup_size(8, 8, 4)
+@compute @workgroup_size(BRICK, BRICK, SLICES)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let entry = params.base + group.x + group.y * GROUPS_PER_ROW;
+    let entry = params.base + item_of_group(group);
     if entry >= list.count {
         return;
     }
-    let corner = brick_at(list.items[entry], params.bricks) * 8u;
-    for (var slice = 0u; slice < 8u; slice += 4u) {
+    let corner = brick_at(list.items[entry], params.bricks) * BRICK;
+    for (var slice = 0u; slice < BRICK; slice += SLICES) {
         let voxel = corner + local + vec3(0u, 0u, slice);
         if all(voxel < params.dims) {
             textureStore(ambient, voxel, vec4(value_at(voxel), 0.0, 0.0, 0.0));

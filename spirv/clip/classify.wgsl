@@ -1,5 +1,5 @@
 // Stages 4a-4e of CAO section 3.5: opacity after clipping, anti-aliased (eq. (5)), and the category of every voxel:
-// a (0) clipped, b (1) visible but its neighbourhood changed, c (2) untouched.
+// a clipped, b visible but its neighbourhood changed, c untouched.
 //
 // Conservative, unlike the paper's recipe: a voxel is untouched only if no point that any clip hides lies within `reach`
 // of it, where `reach` covers the rays, the eight voxels that a sample interpolates and the cell of a clip sample
@@ -18,11 +18,15 @@ struct ClassifyParams {
 }
 
 struct Count {
-    // voxels of category a, b, c
-    category: array<atomic<u32>, 3>,
+    // voxels of each category
+    category: array<atomic<u32>, CATEGORIES>,
 }
 
+// Flags: the paper's recipe.
 const LITERAL = 1u;
+
+#include "shared/bricks.wgsl"
+#include "shared/categories.wgsl"
 
 @group(0) @binding(0) var full_opacity: texture_3d<f32>;
 @group(0) @binding(1) var<storage, read> clips: Clips;
@@ -39,7 +43,7 @@ const LITERAL = 1u;
 
 var<immediate> params: ClassifyParams;
 
-var<workgroup> in_group: array<atomic<u32>, 3>;
+var<workgroup> in_group: array<atomic<u32>, CATEGORIES>;
 
 // Whether the point lies in the dilated (kept shapes: outside the contracted) layers.
 fn in_dilation(c: u32, rigid: vec3<f32>) -> bool {
@@ -73,12 +77,12 @@ fn in_reach(c: u32, world: vec3<f32>) -> bool {
 
 // The same for any clip, in a brick with this word of ClipBricks.
 fn any_in_reach(code: u32, world: vec3<f32>) -> bool {
-    let known = code >> 2u & 3u;
+    let known = reach_in(code);
     if known != SOME {
         return known == ALL;
     }
     for (var c = 0u; c < clips.count; c++) {
-        if (code >> (12u + c) & 1u) != 0u && in_reach(c, world) {
+        if (code >> (REACHING_AT + c) & 1u) != 0u && in_reach(c, world) {
             return true;
         }
     }
@@ -93,52 +97,52 @@ fn classify(voxel: vec3<u32>, code: u32) -> u32 {
     var dilated = any_in_reach(code, centre);
     if !dilated && !literal {
         textureStore(opacity, voxel, vec4(full, 0.0, 0.0, 0.0));
-        return 2u;
+        return UNTOUCHED;
     }
     if literal {
-        for (var i = 1u; i < 9u; i++) {
+        for (var i = 1u; i < FIRST_SAMPLES; i++) {
             dilated = dilated || any_in_reach(code, centre + first_nine(i) * half_edges);
         }
     }
     let share = visible_share(code, centre, half_edges, params.extra_samples);
     textureStore(opacity, voxel, vec4(share * full, 0.0, 0.0, 0.0));
     if !dilated {
-        return 2u;
+        return UNTOUCHED;
     }
-    return u32(share > 0.0);
+    return select(CLIPPED, AFFECTED, share > 0.0);
 }
 
-// Category of all voxels of a brick with this word, 3 where they may differ.
+// Category of all voxels of a brick with this word, CATEGORIES where they may differ.
 fn common_category(code: u32) -> u32 {
-    let visibility = code & 3u;
-    let reach = code >> 2u & 3u;
+    let visibility = visibility_in(code);
+    let reach = reach_in(code);
     if reach == NONE && visibility == VISIBLE {
-        return 2u;
+        return UNTOUCHED;
     }
     if reach != ALL {
-        return 3u;
+        return CATEGORIES;
     }
-    return select(select(3u, 1u, visibility == VISIBLE), 0u, visibility == HIDDEN);
+    return select(select(CATEGORIES, AFFECTED, visibility == VISIBLE), CLIPPED, visibility == HIDDEN);
 }
 
 // Two workgroups a brick, so that all invocations of one go the same way wherever the brick's word decides.
-@compute @workgroup_size(8, 8, 4)
+@compute @workgroup_size(BRICK, BRICK, SLICES)
 fn main(
     @builtin(global_invocation_id) voxel: vec3<u32>,
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let bricks = (params.dims + 7u) / 8u;
-    let code = clip_bricks.code[(group.z / 2u * bricks.y + group.y) * bricks.x + group.x];
+    let brick = vec3(group.xy, group.z / (BRICK / SLICES));
+    let code = clip_bricks.code[brick_index(brick, bricks_of(params.dims))];
     let shared_category = common_category(code);
-    if lane < 3u {
+    if lane < CATEGORIES {
         atomicStore(&in_group[lane], 0u);
     }
     workgroupBarrier();
     if all(voxel < params.dims) {
-        if shared_category < 3u {
+        if shared_category < CATEGORIES {
             let full = textureLoad(full_opacity, voxel, 0).r;
-            textureStore(opacity, voxel, vec4(select(0.0, full, shared_category > 0u), 0.0, 0.0, 0.0));
+            textureStore(opacity, voxel, vec4(select(0.0, full, shared_category != CLIPPED), 0.0, 0.0, 0.0));
             textureStore(mask, voxel, vec4(shared_category, 0u, 0u, 0u));
         } else {
             let category = classify(voxel, code);
@@ -147,9 +151,9 @@ fn main(
         }
     }
     workgroupBarrier();
-    if lane < 3u {
-        let first = group * vec3(8u, 8u, 4u);
-        let here = min(params.dims - first, vec3(8u, 8u, 4u));
+    if lane < CATEGORIES {
+        let size = vec3(BRICK, BRICK, SLICES);
+        let here = min(params.dims - group * size, size);
         let n = select(atomicLoad(&in_group[lane]), here.x * here.y * here.z, lane == shared_category);
         if n > 0u {
             atomicAdd(&count.category[lane], n);

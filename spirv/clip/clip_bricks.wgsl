@@ -1,4 +1,4 @@
-// What the clips do to each brick of 8x8x8 voxels (method.md section 6): whether they hide all of it or nothing, and whether
+// What the clips do to each brick (method.md section 6): whether they hide all of it or nothing, and whether
 // all or none of its voxels have a hidden point within `reach`. Analytic shapes by the distance at the brick's centre and the
 // brick's extent; meshes by the bounds of their depth layers over blocks of pixels, and of their dilation maps, under the
 // brick's footprint. The box of a brick holds every clip sample of its voxels.
@@ -15,14 +15,12 @@ struct ClipBricksParams {
 @group(0) @binding(2) var<storage, read> dilation: Dilation;
 @group(0) @binding(3) var<storage, read_write> clip_bricks: ClipBricks;
 
+#include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/clip_bounds.wgsl"
 #include "shared/reach.wgsl"
 
 var<immediate> params: ClipBricksParams;
-
-// Pixels along the edge of a block of layers.
-const BLOCK = 16u;
 
 // Most cells along the edge of a footprint that are looked at; a larger one has some of everything, as likely as not.
 const MOST_CELLS = 64;
@@ -67,7 +65,7 @@ fn mesh_visibility(c: u32, rigid: vec3<f32>, extent: vec3<f32>) -> u32 {
             for (var pair = 0u; pair < clips.clip[c].pairs; pair++) {
                 all_out = all_out && (place.far <= layers.depth[at] || layers.depth[at + size] <= place.near);
                 block_in = block_in || (layers.depth[at + 2u * size] < place.near && place.far < layers.depth[at + 3u * size]);
-                at += 4u * size;
+                at += BLOCK_BOUNDS * size;
             }
             all_in = all_in && block_in;
         }
@@ -132,15 +130,15 @@ fn shape_reach(c: u32, rigid: vec3<f32>, half_edges: vec3<f32>) -> u32 {
 }
 
 // One invocation a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let bricks = (params.dims + 7u) / 8u;
-    let index = id.x + id.y * groups.x * 64u;
-    if index >= bricks.x * bricks.y * bricks.z {
+    let bricks = bricks_of(params.dims);
+    let index = item_of(id, groups);
+    if index >= brick_count(bricks) {
         return;
     }
-    let first = 8u * vec3(index % bricks.x, index / bricks.x % bricks.y, index / (bricks.x * bricks.y));
-    let last = min(first + 7u, params.dims - 1u);
+    let first = BRICK * brick_at(index, bricks);
+    let last = min(first + (BRICK - 1u), params.dims - 1u);
     let centre = 0.5 * vec3<f32>(vec3<i32>(first + last) - vec3<i32>(params.dims - 1u)) * params.spacing;
     let half_edges = 0.5 * vec3<f32>(last + 1u - first) * params.spacing;
     var visibility = VISIBLE;
@@ -164,5 +162,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
         cutting |= select(0u, 1u << c, sees == CUT || sees == SAMPLED);
         reaching |= select(0u, 1u << c, near == SOME);
     }
-    clip_bricks.code[index] = visibility | reach << 2u | cutting << 4u | reaching << 12u;
+    clip_bricks.code[index] = code_of(visibility, reach, cutting, reaching);
 }

@@ -21,18 +21,14 @@ struct DilateParams {
     per_cell: f32,
 }
 
-struct Layers {
-    depth: array<f32>,
-}
-
+// Hulls of the cells, as in Dilation.
 struct Blocks {
     depth: array<f32>,
 }
 
-struct Dilation {
-    depth: array<f32>,
-}
+#include "shared/layers.wgsl"
 
+// Flags: the outside is hidden; eq. (4) as printed.
 const KEEP = 1u;
 const LITERAL = 2u;
 
@@ -66,8 +62,8 @@ fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
             let b = layers.depth[at + size];
             if keep {
                 front = max(front, f);
-                back = min(back, select(b, 0.0, f >= 1.0));
-            } else if f < 1.0 {
+                back = min(back, select(b, 0.0, f >= EMPTY));
+            } else if f < EMPTY {
                 front = min(front, f);
                 back = max(back, b);
             }
@@ -99,8 +95,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         farthest = min(farthest, vec2<i32>(floor((f32(params.resolution) - params.first) / params.per_cell)));
     }
     // A kept shape ends at the map's edge at the latest: everything beyond is outside it.
-    var front = select(2.0, 0.0, keep);
-    var back = select(-1.0, 1.0, keep);
+    var front = select(NO_FRONT, 0.0, keep);
+    var back = select(NO_BACK, 1.0, keep);
     for (var y = max(here.y - window, nearest.y); y <= min(here.y + window, farthest.y); y++) {
         for (var x = max(here.x - window, nearest.x); x <= min(here.x + window, farthest.x); x++) {
             let apart = abs(vec2(x, y) - here);
@@ -116,7 +112,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             if keep {
                 front = max(front, f + height);
                 back = min(back, b - height);
-            } else if f < 1.0 {
+            } else if f < EMPTY {
                 front = min(front, f - height);
                 back = max(back, b + height);
             }

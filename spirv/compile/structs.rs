@@ -15,8 +15,6 @@ pub struct Struct {
     pub size: u32,
     /// Name and offset of the member of run-time size.
     pub tail: Option<(String, u32)>,
-    /// Bytes as WGSL has it: with a tail, those of one element too.
-    pub span: u32,
 }
 
 /// A member or padding.
@@ -64,8 +62,7 @@ fn visit(
             if found.contains_key(&name) {
                 return Ok(());
             }
-            let mut made =
-                Struct { name: name.clone(), fields: Vec::new(), size: 0, tail: None, span: *span };
+            let mut made = Struct { name: name.clone(), fields: Vec::new(), size: 0, tail: None };
             let taken: Vec<_> = members.iter().filter_map(|m| m.name.as_deref()).collect();
             for member in members {
                 let field = member.name.clone().unwrap_or_default();

@@ -15,17 +15,14 @@
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 
+#include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
+#include "shared/distances.wgsl"
 #include "shared/eyes.wgsl"
 
 struct RaycastParams {
     // pixels of one view
     size: vec2<f32>,
-}
-
-struct Distances {
-    // as brick_distance writes them
-    word: array<u32>,
 }
 
 struct Pixel {
@@ -35,6 +32,9 @@ struct Pixel {
 }
 
 var<immediate> params: RaycastParams;
+
+// Vertices to draw.
+const CORNERS = 6u;
 
 // Two triangles that make a rectangle of the whole image: one large triangle would do, but the software driver of Mesa 22.3
 // forgets the view of triangles that are not half of an upright rectangle.
@@ -47,6 +47,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
 
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
 const LEAP_MARGIN = 0.1;
+
+// Below this gradient of opacity per mm there is no surface.
+const FLAT_PER_MM = 1e-4;
 
 // Halvings of a step at a cut: to 1/16 of it.
 const CUT_HALVINGS = 4u;
@@ -68,7 +71,7 @@ fn surface_light(position: vec3<f32>) -> f32 {
         opacity_at(position + vec3(0.0, 0.0, 1.0)) - opacity_at(position - vec3(0.0, 0.0, 1.0)),
     ) / (2.0 * frame.spacing.xyz);
     let steepness = length(gradient);
-    if steepness < 1e-4 {
+    if steepness < FLAT_PER_MM {
         return 1.0;
     }
     return abs(dot(gradient, frame.light.xyz)) / steepness;
@@ -99,7 +102,7 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
     // Interleaved gradient noise (Jimenez 2014) against banding.
     let noise = fract(52.9829189 * fract(dot(place.xy, vec2(0.06711056, 0.00583715))));
     let phase = select(0.5, noise, frame.jitter > 0.0);
-    let bricks = (vec3<u32>(frame.dims.xyz) + 7u) / 8u;
+    let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
     let last_brick = vec3<i32>(bricks) - 1;
 
     var colour = vec3(0.0);
@@ -116,15 +119,16 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
             break;
         }
         let position = start + t * along;
-        let brick = clamp(vec3<i32>(floor(position / 8.0)), vec3(0), last_brick);
-        let word = distances.word[(u32(brick.z) * bricks.y + u32(brick.y)) * bricks.x + u32(brick.x)];
-        let to_opacity = i32(word & 0xfffu);
-        let leap = i32(word >> 12u & 0xfffu);
+        let brick = clamp(vec3<i32>(floor(position / f32(BRICK))), vec3(0), last_brick);
+        let word = distances.word[brick_index(vec3<u32>(brick), bricks)];
+        let far = vec2<i32>(distances_of(word));
+        let to_opacity = far.x;
+        let leap = far.y;
         if leap > 0 && k != landed {
             // To the first sample behind the bricks nearer than `leap`; samples keep their places, so the picture does not
             // change.
-            let low = vec3<f32>(brick - leap + 1) * 8.0;
-            let high = vec3<f32>(brick + leap) * 8.0;
+            let low = vec3<f32>(brick - leap + 1) * f32(BRICK);
+            let high = vec3<f32>(brick + leap) * f32(BRICK);
             let out_low = select((low - start) / along, vec3(1e30), brick < vec3(leap));
             let out_high = select((high - start) / along, vec3(1e30), brick + leap > last_brick);
             // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
@@ -145,7 +149,7 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
         if a <= 0.0 {
             continue;
         }
-        if !visible_to(word >> 24u, eye.origin.xyz + t * ray.direction) {
+        if !visible_to(asked_in(word), eye.origin.xyz + t * ray.direction) {
             hidden = k;
             continue;
         }

@@ -10,50 +10,47 @@ struct BricksParams {
     bricks: vec3<u32>,
 }
 
-struct ChangedList {
-    groups_x: atomic<u32>,
-    groups_y: atomic<u32>,
-    groups_z: u32,
-    count: atomic<u32>,
-    items: array<u32>,
-}
-
 struct ChangedBefore {
     flags: array<u32>,
 }
 
+#include "shared/categories.wgsl"
+#include "shared/growing.wgsl"
+
+// Modes.
 const ALL = 0u;
 const NEEDED = 1u;
 const CHANGED = 2u;
-const GROUPS_PER_ROW = 65535u;
-const UNTOUCHED = 2u;
+
+// Voxels along the edge of a brick with its neighbours' nearest.
+const AROUND = BRICK + 2u;
 
 var<immediate> params: BricksParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
 @group(0) @binding(1) var mask: texture_3d<u32>;
 @group(0) @binding(2) var<storage, read_write> changed_before: ChangedBefore;
-@group(0) @binding(3) var<storage, read_write> list: ChangedList;
+@group(0) @binding(3) var<storage, read_write> list: GrowingList;
 
 var<workgroup> found: atomic<u32>;
 
 // One workgroup a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = group.x + group.y * groups.x;
-    let inside = index < params.bricks.x * params.bricks.y * params.bricks.z;
-    let brick = vec3(index % params.bricks.x, index / params.bricks.x % params.bricks.y, index / (params.bricks.x * params.bricks.y));
+    let inside = index < brick_count(params.bricks);
+    let brick = brick_at(index, params.bricks);
     if lane == 0u {
         atomicStore(&found, 0u);
     }
     workgroupBarrier();
     if inside && params.mode == NEEDED {
         let last = vec3<i32>(params.dims) - 1;
-        for (var i = lane; i < 1000u; i += 64u) {
-            let voxel = vec3<i32>(brick * 8u) + vec3<i32>(vec3(i % 10u, i / 10u % 10u, i / 100u)) - 1;
+        for (var i = lane; i < AROUND * AROUND * AROUND; i += LANES) {
+            let voxel = vec3<i32>(brick * BRICK) + vec3<i32>(brick_at(i, vec3(AROUND))) - 1;
             if all(voxel >= vec3(0)) && all(voxel <= last) && textureLoad(opacity, voxel, 0).r > 0.0 {
                 atomicStore(&found, 1u);
                 break;
@@ -61,8 +58,8 @@ fn main(
         }
     }
     if inside && params.mode == CHANGED {
-        for (var i = lane; i < 512u; i += 64u) {
-            let voxel = brick * 8u + vec3(i & 7u, i >> 3u & 7u, i >> 6u);
+        for (var i = lane; i < BRICK * BRICK * BRICK; i += LANES) {
+            let voxel = brick * BRICK + brick_at(i, vec3(BRICK));
             if all(voxel < params.dims) && textureLoad(mask, voxel, 0).r != UNTOUCHED {
                 atomicStore(&found, 1u);
                 break;
@@ -80,8 +77,9 @@ fn main(
         if listed {
             let slot = atomicAdd(&list.count, 1u);
             list.items[slot] = index;
-            atomicMax(&list.groups_x, min(slot + 1u, GROUPS_PER_ROW));
-            atomicMax(&list.groups_y, slot / GROUPS_PER_ROW + 1u);
+            let through = groups_through(slot);
+            atomicMax(&list.groups_x, through.x);
+            atomicMax(&list.groups_y, through.y);
         }
     }
 }

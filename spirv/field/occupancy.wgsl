@@ -1,4 +1,4 @@
-// Which bricks of 8x8x8 voxels can show anything: the largest opacity that the transfer function gives to any value
+// Which bricks can show anything: the largest opacity that the transfer function gives to any value
 // between the smallest and the largest of the brick's voxels and their neighbours. Samples interpolate between voxels,
 // so their value stays in that range, and a brick without opacity there can be skipped without changing the picture.
 
@@ -9,10 +9,7 @@ struct OccupancyParams {
     bias: f32,
 }
 
-struct Occupancy {
-    visible: array<u32>,
-}
-
+#include "shared/words.wgsl"
 #include "shared/transfer.wgsl"
 
 var<immediate> params: OccupancyParams;
@@ -20,15 +17,15 @@ var<immediate> params: OccupancyParams;
 @group(0) @binding(2) var<storage, read_write> occupancy: Occupancy;
 
 // One invocation a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = id.x + id.y * groups.x * 64u;
-    if index >= params.bricks.x * params.bricks.y * params.bricks.z {
+    let index = item_of(id, groups);
+    if index >= brick_count(params.bricks) {
         return;
     }
-    let brick = vec3(index % params.bricks.x, index / params.bricks.x % params.bricks.y, index / (params.bricks.x * params.bricks.y));
-    let first = max(vec3<i32>(brick * 8u) - 1, vec3(0));
-    let last = min(vec3<i32>(brick * 8u) + 8, vec3<i32>(params.dims) - 1);
+    let corner = vec3<i32>(brick_at(index, params.bricks) * BRICK);
+    let first = max(corner - 1, vec3(0));
+    let last = min(corner + i32(BRICK), vec3<i32>(params.dims) - 1);
     var low = 3.4e38;
     var high = -3.4e38;
     for (var z = first.z; z <= last.z; z++) {

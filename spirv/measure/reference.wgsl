@@ -16,6 +16,7 @@ struct ReferenceParams {
     step: f32,
     // step / reference length of the opacity
     exponent: f32,
+    // AMBIENT, LITERAL
     rule: u32,
     // points to work on
     base: u32,
@@ -38,12 +39,12 @@ struct Found {
     ambient: array<f32>,
 }
 
+#include "shared/bricks.wgsl"
+#include "shared/opaque.wgsl"
+
+// Rules along a ray.
 const AMBIENT = 0u;
-const LANES = 64u;
-// Largest group count along one axis that every device has.
-const GROUPS_PER_ROW = 65535u;
-// Below this q = 1 - a counts as 0: log(q) of a rounded 0 would be anything.
-const OPAQUE = 1e-6;
+const LITERAL = 1u;
 // What is left of a ray below this adds no more than this.
 const DARK = 1e-7;
 
@@ -56,7 +57,7 @@ var<immediate> params: ReferenceParams;
 @group(0) @binding(4) var<storage, read> points: Points;
 @group(0) @binding(5) var<storage, read_write> found: Found;
 
-var<workgroup> sums: array<f32, 64>;
+var<workgroup> sums: array<f32, LANES>;
 
 fn opacity_at(position: vec3<f32>) -> f32 {
     if params.filtered == 1u {
@@ -128,9 +129,9 @@ fn ray(start: vec3<f32>, along: vec3<f32>) -> f32 {
 }
 
 // One workgroup a point; its invocations share the directions.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = group.x + group.y * GROUPS_PER_ROW;
+    let index = item_of_group(group);
     let listed = index < params.count;
     var sum = 0.0;
     if listed && params.samples > 0u {

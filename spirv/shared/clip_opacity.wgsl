@@ -4,9 +4,14 @@
 #include "shared/clips.wgsl"
 #include "shared/clip_bounds.wgsl"
 
+// Samples that every voxel has: its centre and its corners.
+const FIRST_SAMPLES = 9u;
+// Further samples where these disagree.
+const MOST_SAMPLES = 32u;
+
 struct Positions {
     // in the voxel's [-1, 1]^3
-    sample: array<vec4<f32>, 32>,
+    sample: array<vec4<f32>, MOST_SAMPLES>,
 }
 
 // Centre, then the eight corners.
@@ -37,8 +42,8 @@ fn voxel_visibility(among: u32, centre: vec3<f32>, half_edges: vec3<f32>) -> u32
 // The share of the voxel with this centre in mm, in a brick with this word of ClipBricks. Samples are taken only where neither
 // the brick's bounds nor the voxel's own decide, which changes no bit of the answer. `more` is N of eq. (5).
 fn visible_share(code: u32, centre: vec3<f32>, half_edges: vec3<f32>, more: u32) -> f32 {
-    let cutting = code >> 4u & 0xffu;
-    var known = code & 3u;
+    let cutting = cutting_in(code);
+    var known = visibility_in(code);
     if known == CUT {
         known = voxel_visibility(cutting, centre, half_edges);
     }
@@ -49,14 +54,14 @@ fn visible_share(code: u32, centre: vec3<f32>, half_edges: vec3<f32>, more: u32)
         return 0.0;
     }
     var seen = 0u;
-    for (var i = 0u; i < 9u; i++) {
+    for (var i = 0u; i < FIRST_SAMPLES; i++) {
         seen += u32(visible_to(cutting, centre + first_nine(i) * half_edges));
     }
-    if seen == 0u || seen == 9u {
-        return f32(seen / 9u);
+    if seen == 0u || seen == FIRST_SAMPLES {
+        return f32(seen / FIRST_SAMPLES);
     }
     for (var i = 0u; i < more; i++) {
         seen += u32(visible_to(cutting, centre + positions.sample[i].xyz * half_edges));
     }
-    return f32(seen) / f32(9u + more);
+    return f32(seen) / f32(FIRST_SAMPLES + more);
 }

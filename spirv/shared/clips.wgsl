@@ -1,5 +1,8 @@
 // Clip shapes at their poses, and which points they hide (CAO section 3.2). A point on a surface is visible, eq. (1).
 
+#include "shared/clip_bits.wgsl"
+#include "shared/layers.wgsl"
+
 struct Clip {
     // rows of the world -> rigid frame transform, mm
     to_rigid: array<vec4<f32>, 3>,
@@ -22,26 +25,14 @@ struct Clip {
     cells: vec4<f32>,
     // meshes: place in `layers` of the bounds of blocks
     blocks_at: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
 }
 
 struct Clips {
     count: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
-    clip: array<Clip, 8>,
+    clip: array<Clip, MOST_CLIPS>,
 }
 
-struct Layers {
-    // for each pair: front map, back map; rows of y, x fastest; depth 0 ... 1 of the clip camera; empty: front 1. Behind them, for
-    // each pair, over blocks of 16 x 16 pixels: nearest front and farthest back (2 and -1 where nothing is inside), farthest
-    // front and nearest back (2 and -1 where a pixel has no inside)
-    depth: array<f32>,
-}
-
+// Kinds of shapes.
 const PLANE = 0u;
 const BOX = 1u;
 const SPHERE = 2u;
@@ -134,5 +125,5 @@ fn visible_to(among: u32, world: vec3<f32>) -> bool {
 }
 
 fn visible(world: vec3<f32>) -> bool {
-    return visible_to(0xffu, world);
+    return visible_to(ALL_CLIPS, world);
 }

@@ -1,5 +1,8 @@
 // Views and the frame's settings. World is millimetres with the volume's centre at the origin.
 
+// Views drawn at once.
+const MOST_VIEWS = 4u;
+
 struct Eye {
     // position in mm
     origin: vec4<f32>,
@@ -16,7 +19,7 @@ struct Eye {
 
 struct Frame {
     // one a view, in the order of the image's layers; left and right eye first
-    eye: array<Eye, 4>,
+    eye: array<Eye, MOST_VIEWS>,
     // voxels along each axis
     dims: vec4<f32>,
     // mm; w: step along the ray in mm

@@ -1,9 +1,6 @@
 // How near a point is to what a clip hides.
 
-struct Dilation {
-    // for each pair: front map, back map, as in Layers
-    depth: array<f32>,
-}
+#include "shared/layers.wgsl"
 
 // A lower bound in mm of the distance from a point of the rigid frame to what an analytic clip hides, negative inside it; as
 // clip.rs has it.

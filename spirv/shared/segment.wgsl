@@ -1,5 +1,7 @@
 // Exact segment rule (method.md section 3): transmittance q = 1 - a linear between the two ends of a segment.
 
+#include "shared/opaque.wgsl"
+
 // ln q, of 0 a large negative number: q ln q goes to 0 with q.
 fn logarithm(q: f32) -> f32 {
     return log(max(q, 1e-30));

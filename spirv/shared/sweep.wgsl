@@ -4,6 +4,8 @@
 // begins at. Its step i is at voxel (u + i du, w + i dw, r + i |da|), the first two modulo the volume; walked from the upper
 // end where da < 0.
 
+#include "shared/rays.wgsl"
+
 // Lines of a tile along the faster axis across the walk and along the other: eight lie side by side in memory.
 const TILE = vec2(8u, 4u);
 // Segments of a chunk, the last window permitting.
@@ -28,7 +30,7 @@ struct SweepHead {
 }
 
 struct SweepList {
-    head: array<SweepHead, 54>,
+    head: array<SweepHead, MOST_RAYS>,
     runs: array<Run>,
 }
 

@@ -1,15 +1,16 @@
 // Transfer function: piecewise linear between control points, constant beyond the first and the last. Two points of equal
 // value make a step; at the value itself the second holds.
 
+// Control points of an opacity or a colour.
+const MOST_POINTS = 64u;
+
 struct Transfer {
     opacity_points: u32,
     colour_points: u32,
-    pad0: u32,
-    pad1: u32,
     // value, opacity per reference length, slope towards the next point, unused
-    opacity: array<vec4<f32>, 64>,
+    opacity: array<vec4<f32>, MOST_POINTS>,
     // value, linear red, green, blue
-    colour: array<vec4<f32>, 64>,
+    colour: array<vec4<f32>, MOST_POINTS>,
 }
 
 @group(0) @binding(1) var<storage, read> transfer: Transfer;

@@ -20,40 +20,14 @@ struct CarveParams {
     capacity: u32,
 }
 
-struct Occupancy {
-    visible: array<u32>,
-}
-
-// For each brick where its opacity lies: bit (dx+1) + 3 (dy+1) + 9 (dz+1) is set if a voxel with opacity touches the
-// neighbour brick at (dx, dy, dz), and bit 13 if any voxel has opacity.
-struct Contact {
-    bits: array<u32>,
-}
-
 // Squared distance in mm from each brick to the nearest changed one.
 struct Change {
     distance: array<f32>,
 }
 
-struct Todo {
-    // as in shared/bricks.wgsl; only octants that changed here
-    brick: array<u32>,
-}
-
-struct GrowingList {
-    groups_x: atomic<u32>,
-    groups_y: atomic<u32>,
-    groups_z: u32,
-    count: atomic<u32>,
-    items: array<u32>,
-}
-
-// Opacities that changed bricks had: for each of the 256 invocations of a brick those of its two slices, in 65535ths.
-struct Past {
-    opacities: array<u32>,
-}
-
-#include "shared/bricks.wgsl"
+#include "shared/growing.wgsl"
+#include "shared/past.wgsl"
+#include "shared/todo.wgsl"
 #include "shared/transfer.wgsl"
 
 var<immediate> params: CarveParams;
@@ -71,23 +45,26 @@ var<immediate> params: CarveParams;
 @group(0) @binding(12) var opacity: texture_storage_3d<r16unorm, read_write>;
 @group(0) @binding(13) var<storage, read_write> changed: GrowingList;
 @group(0) @binding(14) var<storage, read_write> past: Past;
+// only octants that changed
 @group(0) @binding(15) var<storage, read_write> todo: Todo;
 
 #include "shared/clip_opacity.wgsl"
 
+const CUTTING = ALL_CLIPS << CUTTING_AT;
+const OF_INTEREST = VISIBILITY_MASK | CUTTING;
+
 // One invocation a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn list_bricks(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let bricks = (params.dims + 7u) / 8u;
-    let index = id.x + id.y * groups.x * 64u;
-    if index >= bricks.x * bricks.y * bricks.z {
+    let index = item_of(id, groups);
+    if index >= brick_count(bricks_of(params.dims)) {
         return;
     }
     // Visibility and the clips that leave it open; how far away they reach is of no interest here.
-    let now = clip_bricks.code[index] & 0xff3u;
+    let now = clip_bricks.code[index] & OF_INTEREST;
     let before = clip_bricks_before.code[index];
     clip_bricks_before.code[index] = now;
-    let cut = ((now | before) & 0xff0u) != 0u;
+    let cut = ((now | before) & CUTTING) != 0u;
     if !(params.all == 1u || cut || now != before) {
         return;
     }
@@ -108,7 +85,7 @@ fn value_of(voxel: vec3<u32>) -> f32 {
 }
 
 fn contact_of(local: vec3<u32>) -> u32 {
-    let touches = vec3(2u) | select(vec3(0u), vec3(1u), local == vec3(0u)) | select(vec3(0u), vec3(4u), local == vec3(7u));
+    let touches = vec3(2u) | select(vec3(0u), vec3(1u), local == vec3(0u)) | select(vec3(0u), vec3(4u), local == vec3(BRICK - 1u));
     var plane = 0u;
     var cube = 0u;
     for (var i = 0u; i < 3u; i++) {
@@ -127,15 +104,15 @@ var<workgroup> different: atomic<u32>;
 var<workgroup> place: u32;
 
 // One workgroup a brick; each invocation takes two slices.
-@compute @workgroup_size(8, 8, 4)
+@compute @workgroup_size(BRICK, BRICK, SLICES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let entry = group.x + group.y * GROUPS_PER_ROW;
+    let entry = item_of_group(group);
     let listed = entry < list.count;
-    let bricks = (params.dims + 7u) / 8u;
+    let bricks = bricks_of(params.dims);
     let index = list.items[select(0u, entry, listed)];
     let code = clip_bricks.code[index];
     if lane == 0u {
@@ -143,21 +120,21 @@ fn main(
         atomicStore(&different, 0u);
     }
     workgroupBarrier();
-    var before = array<u32, 2>(0u, 0u);
-    for (var slice = 0u; slice < 8u; slice += 4u) {
+    var before = array<u32, BRICK / SLICES>();
+    for (var slice = 0u; slice < BRICK; slice += SLICES) {
         let inside = local + vec3(0u, 0u, slice);
-        let voxel = brick_at(index, bricks) * 8u + inside;
+        let voxel = brick_at(index, bricks) * BRICK + inside;
         if listed && all(voxel < params.dims) {
             let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
             var value = opacity_of(value_of(voxel));
             if value > 0.0 {
                 value *= visible_share(code, centre, 0.5 * params.spacing, params.extra_samples);
             }
-            let now = u32(round(value * 65535.0));
-            let stored = u32(round(textureLoad(opacity, voxel).r * 65535.0));
-            before[slice / 4u] = stored;
+            let now = u32(round(value * PARTS));
+            let stored = u32(round(textureLoad(opacity, voxel).r * PARTS));
+            before[slice / SLICES] = stored;
             if now != stored {
-                textureStore(opacity, voxel, vec4(f32(now) / 65535.0, 0.0, 0.0, 0.0));
+                textureStore(opacity, voxel, vec4(f32(now) / PARTS, 0.0, 0.0, 0.0));
                 atomicOr(&different, changed_bit(inside));
             }
             if now > 0u {
@@ -185,6 +162,6 @@ fn main(
     }
     workgroupBarrier();
     if place < params.capacity {
-        past.opacities[place * 256u + lane] = before[0] | before[1] << 16u;
+        past.opacities[place * PAST_WORDS + lane] = before[0] | before[1] << PAST_BITS;
     }
 }

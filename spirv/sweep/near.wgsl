@@ -23,26 +23,16 @@ struct Distance {
     squared: array<f32>,
 }
 
-struct Contact {
-    // as in carve.wgsl
-    bits: array<u32>,
-}
+// Bits of a squared distance that is farther than any volume reaches: what no brick is near to. After `choose` hosts fill with it.
+const FAR = 0x7e000000u;
 
-struct Todo {
-    brick: array<u32>,
-}
-
+// What was chosen, in all.
 struct Chosen {
-    // to do
+    // bricks to do
     bricks: atomic<u32>,
-    // bounds of the bricks to compute anew, x, y, z, and of those that changed
+    // least and greatest place x, y, z of the bricks to compute anew, then of those that changed
     low: array<atomic<u32>, 6>,
     high: array<atomic<u32>, 6>,
-}
-
-// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
-struct Solid {
-    bits: array<u32>,
 }
 
 // Bricks that have values.
@@ -50,7 +40,7 @@ struct Valued {
     brick: array<u32>,
 }
 
-#include "shared/bricks.wgsl"
+#include "shared/todo.wgsl"
 
 var<immediate> params: NearParams;
 @group(0) @binding(0) var<storage, read> before: Distance;
@@ -63,10 +53,10 @@ var<immediate> params: NearParams;
 @group(0) @binding(7) var<storage, read> changed: BrickList;
 
 // One invocation a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = id.x + id.y * groups.x * 64u;
-    if index >= params.bricks.x * params.bricks.y * params.bricks.z {
+    let index = item_of(id, groups);
+    if index >= brick_count(params.bricks) {
         return;
     }
     let here = i32(brick_at(index, params.bricks)[params.axis]);
@@ -74,11 +64,11 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     let stride = vec3(1u, params.bricks.x, params.bricks.x * params.bricks.y)[params.axis];
     let edge = params.spacing[params.axis];
     let first = index - u32(here) * stride;
-    // Bricks n apart have 8 (n - 1) + 1 voxels' spacing between their nearest voxels.
-    let most = i32(min(params.reach / (8.0 * edge) + 2.0, f32(size)));
+    // Bricks n apart have BRICK (n - 1) + 1 voxels' spacing between their nearest voxels.
+    let most = i32(min(params.reach / (f32(BRICK) * edge) + 2.0, f32(size)));
     var least = before.squared[index];
     for (var there = max(here - most, 0); there <= min(here + most, size - 1); there++) {
-        let gap = f32(max(8 * abs(there - here) - 7, 0)) * edge;
+        let gap = f32(max(i32(BRICK) * abs(there - here) - i32(BRICK - 1u), 0)) * edge;
         least = min(least, before.squared[first + u32(there) * stride] + gap * gap);
     }
     after.squared[index] = least;
@@ -92,10 +82,10 @@ fn bound(brick: vec3<u32>, first: u32) {
 }
 
 // One invocation a brick.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = id.x + id.y * groups.x * 64u;
-    if index >= params.bricks.x * params.bricks.y * params.bricks.z {
+    let index = item_of(id, groups);
+    if index >= brick_count(params.bricks) {
         return;
     }
     let own = brick_at(index, params.bricks);
@@ -127,11 +117,11 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
         word |= select(TODO, TODO | ANEW, anew);
         atomicAdd(&chosen.bricks, 1u);
         if anew {
-            bound(own, 0u);
+            bound(own, OF_ANEW);
         }
     }
     if (word & ALL_CHANGED) != 0u {
-        bound(own, 3u);
+        bound(own, OF_CHANGED);
     }
     todo.brick[index] = word;
     valued.brick[index] = needed;

@@ -5,12 +5,7 @@ struct PastParams {
     dims: vec3<u32>,
 }
 
-// As carve.wgsl lays them out.
-struct Past {
-    opacities: array<u32>,
-}
-
-#include "shared/bricks.wgsl"
+#include "shared/past.wgsl"
 
 var<immediate> params: PastParams;
 @group(0) @binding(0) var<storage, read> changed: BrickList;
@@ -18,25 +13,25 @@ var<immediate> params: PastParams;
 @group(0) @binding(2) var opacity: texture_storage_3d<r16unorm, read_write>;
 
 // One workgroup a brick; each invocation takes two slices.
-@compute @workgroup_size(8, 8, 4)
+@compute @workgroup_size(BRICK, BRICK, SLICES)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    let entry = group.x + group.y * GROUPS_PER_ROW;
-    let at = entry * 256u + lane;
+    let entry = item_of_group(group);
+    let at = entry * PAST_WORDS + lane;
     if entry >= changed.count || at >= arrayLength(&past.opacities) {
         return;
     }
-    let bricks = (params.dims + 7u) / 8u;
+    let bricks = bricks_of(params.dims);
     let before = past.opacities[at];
     var now = 0u;
-    for (var slice = 0u; slice < 2u; slice++) {
-        let voxel = brick_at(changed.items[entry], bricks) * 8u + local + vec3(0u, 0u, 4u * slice);
+    for (var slice = 0u; slice < BRICK / SLICES; slice++) {
+        let voxel = brick_at(changed.items[entry], bricks) * BRICK + local + vec3(0u, 0u, SLICES * slice);
         if all(voxel < params.dims) {
-            now |= u32(round(textureLoad(opacity, voxel).r * 65535.0)) << (16u * slice);
-            textureStore(opacity, voxel, vec4(f32(before >> (16u * slice) & 0xffffu) / 65535.0, 0.0, 0.0, 0.0));
+            now |= u32(round(textureLoad(opacity, voxel).r * PARTS)) << (PAST_BITS * slice);
+            textureStore(opacity, voxel, vec4(f32(before >> (PAST_BITS * slice) & PAST_MASK) / PARTS, 0.0, 0.0, 0.0));
         }
     }
     past.opacities[at] = now;

@@ -41,7 +41,7 @@ struct SweepParams {
     start: f32,
     // segments behind the first: `window`, or 0
     far: f32,
-    // weight of a direction in 65535ths / length of the ray in segments
+    // weight of a direction in parts / length of the ray in segments
     share: f32,
     // the lattice direction without whole sizes of the volume
     advance: vec3<i32>,
@@ -49,18 +49,10 @@ struct SweepParams {
     part: i32,
 }
 
-struct Todo {
-    brick: array<u32>,
-}
-
-// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
-struct Solid {
-    bits: array<u32>,
-}
-
-#include "shared/bricks.wgsl"
+#include "shared/parts.wgsl"
 #include "shared/segment.wgsl"
 #include "shared/sweep.wgsl"
+#include "shared/todo.wgsl"
 
 // The first direction, which begins the sum.
 const FIRST = 1u;
@@ -70,8 +62,8 @@ const AMEND = 2u;
 const ADD = 4u;
 // Longest window.
 const MOST = 128u;
-// Both ends opaque: nothing comes through (lao.wgsl).
-const OPAQUE = 1e-6;
+// Chunks of `lead` that are remembered: those of the longest window.
+const RING = MOST / u32(CHUNK);
 
 var<immediate> params: SweepParams;
 // Read as a storage image: for one texel on a processor at half the cost of a sampled one.
@@ -252,7 +244,7 @@ fn step_from(p: vec3<i32>, advance: vec3<i32>) -> Step {
     return Step(next - select(vec3(0), select(dims, -dims, params.step < vec3(0)), left), gap);
 }
 
-// A ray's contribution in 65535ths, whole so that the sum is exact in any order and can be taken back.
+// A ray's contribution in parts, whole so that the sum is exact in any order and can be taken back.
 fn occluded(unobstructed: f32, sum: f32) -> f32 {
     return round(params.share * max(unobstructed - sum, 0.0));
 }
@@ -261,15 +253,15 @@ fn subtract(p: vec3<i32>, parts: f32) {
     if parts == 0.0 && (params.flags & FIRST) == 0u {
         return;
     }
-    let word = todo.brick[brick_index(vec3<u32>(p) / 8u, params.bricks)];
+    let word = todo.brick[brick_index(vec3<u32>(p) / BRICK, params.bricks)];
     if (word & (TODO | ANEW)) != select(TODO | ANEW, TODO, (params.flags & AMEND) != 0u) {
         return;
     }
-    var before = 65535.0;
+    var before = PARTS;
     if (params.flags & FIRST) == 0u {
-        before = round(65535.0 * textureLoad(ambient, p).r);
+        before = round(PARTS * textureLoad(ambient, p).r);
     }
-    textureStore(ambient, p, vec4((before - parts) / 65535.0, 0.0, 0.0, 0.0));
+    textureStore(ambient, p, vec4((before - parts) / PARTS, 0.0, 0.0, 0.0));
 }
 
 // Whether the next `size` segments from p stay inside the volume and meet no brick with opacity, samples between lattice points
@@ -284,17 +276,17 @@ fn free_from(p: vec3<i32>, size: i32) -> bool {
         if any(low < vec3(0)) || any(high >= vec3<i32>(params.dims)) {
             return false;
         }
-        let brick = vec3<u32>(low) / 8u;
-        let passed = vec3<u32>(high) / 8u - brick;
+        let brick = vec3<u32>(low) / BRICK;
+        let passed = vec3<u32>(high) / BRICK - brick;
         let bits = solid.bits[brick_index(brick, params.bricks)];
         solid_bits |= bits >> (passed.x + 2u * passed.y + 4u * passed.z);
     }
     return (solid_bits & 1u) == 0u;
 }
 
-// One workgroup a run of chunks of a tile of 8x4 lines. `long`: windows fill a chunk, so that no place of it is asked for.
+// One workgroup a run of chunks of a tile of lines. `long`: windows fill a chunk, so that no place of it is asked for.
 fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
-    let entry = group.x + group.y * GROUPS_PER_ROW;
+    let entry = item_of_group(group);
     if entry >= list.head[params.list].count {
         return;
     }
@@ -323,9 +315,9 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
     // What the first middle is composed of; before a line's first chunk there is a gap.
     let begin = select(first - whole - 1, first, run.first == 0u);
 
-    // Of the last 16 chunks of `lead`: all, and the `odd` last segments.
-    var chunks: array<Link, 16>;
-    var odds: array<Link, 16>;
+    // Of the last chunks of `lead`: all, and the `odd` last segments.
+    var chunks: array<Link, RING>;
+    var odds: array<Link, RING>;
     // Contributions of rays backwards, until their voxels have those forwards.
     var backwards: array<f32, MOST + 1>;
     var place = 0;
@@ -337,7 +329,7 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
         // Of each place in `trail`: the ray's t, s, free from its start to the chunk's end; the sum back from there.
         var suffixes: array<vec3<f32>, CHUNK>;
         var suffixes_back: array<f32, CHUNK>;
-        var middle = odds[u32(c - whole - 1) % 16u];
+        var middle = odds[u32(c - whole - 1) % RING];
         if c >= first {
             var links: array<Link, CHUNK>;
             if free_from(trail.p, size) {
@@ -375,7 +367,7 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
             }
             var length = f32(odd);
             for (var k = c - whole; k < c; k++) {
-                middle = join(middle, length, chunks[u32(k) % 16u], f32(size));
+                middle = join(middle, length, chunks[u32(k) % RING], f32(size));
                 length += f32(size);
             }
         }
@@ -437,24 +429,24 @@ fn walk(fine: bool, long: bool, group: vec3<u32>, local: vec3<u32>) {
                 }
             }
         }
-        chunks[u32(c) % 16u] = chunk;
-        odds[u32(c) % 16u] = last;
+        chunks[u32(c) % RING] = chunk;
+        odds[u32(c) % RING] = last;
     }
 }
 
-@compute @workgroup_size(8, 4, 1)
+@compute @workgroup_size(TILE.x, TILE.y, 1)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(false, true, group, local);
 }
 
 // Windows shorter than a chunk.
-@compute @workgroup_size(8, 4, 1)
+@compute @workgroup_size(TILE.x, TILE.y, 1)
 fn short(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(false, false, group, local);
 }
 
 // Segments of more than one piece.
-@compute @workgroup_size(8, 4, 1)
+@compute @workgroup_size(TILE.x, TILE.y, 1)
 fn pieces(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     walk(true, false, group, local);
 }

@@ -11,7 +11,7 @@ struct ListParams {
     // 1: rays that meet a change are listed; 0: all rays of bricks to compute anew
     amend: u32,
     bricks: vec3<u32>,
-    // edge of what is looked at, a brick's octants or bricks: 4 or 8
+    // edge of what is looked at: OCTANT or BRICK
     cell: i32,
 }
 
@@ -30,10 +30,6 @@ struct Directions {
     direction: array<Direction>,
 }
 
-struct Todo {
-    brick: array<u32>,
-}
-
 // As near.wgsl writes them.
 struct Chosen {
     bricks: u32,
@@ -41,8 +37,8 @@ struct Chosen {
     high: array<u32, 6>,
 }
 
-#include "shared/bricks.wgsl"
 #include "shared/sweep.wgsl"
+#include "shared/todo.wgsl"
 
 struct CountedHead {
     groups_x: atomic<u32>,
@@ -53,7 +49,7 @@ struct CountedHead {
 }
 
 struct CountedList {
-    head: array<CountedHead, 54>,
+    head: array<CountedHead, MOST_RAYS>,
     runs: array<Run>,
 }
 
@@ -82,7 +78,7 @@ fn any_cell(box: Across, along: i32, axis: u32, dims: vec3<i32>) -> bool {
             let columns = piece(u, extent.x);
             voxel[across.x] = u;
             let at = vec3<u32>(voxel);
-            let word = todo.brick[brick_index(at / 8u, params.bricks)];
+            let word = todo.brick[brick_index(at / BRICK, params.bricks)];
             if (word & select(ANEW, changed_bit(at), params.amend == 1u)) != 0u {
                 return true;
             }
@@ -95,10 +91,19 @@ fn any_cell(box: Across, along: i32, axis: u32, dims: vec3<i32>) -> bool {
     return false;
 }
 
+// Along an axis, of the brick at a place.
+fn first_voxel(place: u32) -> i32 {
+    return i32(BRICK) * i32(place);
+}
+
+fn last_voxel(place: u32) -> i32 {
+    return i32(BRICK) * i32(place) + i32(BRICK - 1u);
+}
+
 // Whether `size` voxels from `begin` on, wrapped into the extent, miss bricks first ... last.
 fn misses(begin: i32, size: i32, extent: i32, first: u32, last: u32) -> bool {
     let end = begin + size - 1;
-    return (begin > 8 * i32(last) + 7 || end < 8 * i32(first)) && end - extent < 8 * i32(first);
+    return (begin > last_voxel(last) || end < first_voxel(first)) && end - extent < first_voxel(first);
 }
 
 // What the lines of a tile pass across the walk in steps i ... j: where it begins, wrapped into the volume, and its size.
@@ -128,14 +133,14 @@ fn first_wanted(line: vec3<i32>, c: i32, steps: i32, d: Direction, dims: vec3<i3
     let origin = select(line.z, dims[d.axis] - 1 - line.z, stride < 0);
 
     // Where there is something at all.
-    let kind = 3u * params.amend;
+    let kind = select(OF_ANEW, OF_CHANGED, params.amend == 1u);
     let first = vec3(chosen.low[kind], chosen.low[kind + 1u], chosen.low[kind + 2u]);
     let end = vec3(chosen.high[kind], chosen.high[kind + 1u], chosen.high[kind + 2u]);
     let axes = line_axes(d.axis);
     let extent = line_extent(d.axis, dims);
     let ends = origin + vec2(i - beside, last + beside) * stride;
     let chunk = across_steps(line, i - beside, last + beside, d, dims);
-    if max(ends.x, ends.y) < 8 * i32(first[d.axis]) || min(ends.x, ends.y) > 8 * i32(end[d.axis]) + 7
+    if max(ends.x, ends.y) < first_voxel(first[d.axis]) || min(ends.x, ends.y) > last_voxel(end[d.axis])
         || misses(chunk.begin.x, chunk.size.x, extent.x, first[axes.x], end[axes.x])
         || misses(chunk.begin.y, chunk.size.y, extent.y, first[axes.y], end[axes.y]) {
         return -1;
@@ -167,10 +172,11 @@ fn add_run(direction: u32, run: Run) {
 }
 
 // One invocation a tile and direction.
-@compute @workgroup_size(64)
+@compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let d = directions.direction[id.y];
-    if id.x >= d.count || chosen.low[3u * params.amend] > chosen.high[3u * params.amend] {
+    let kind = select(OF_ANEW, OF_CHANGED, params.amend == 1u);
+    if id.x >= d.count || chosen.low[kind] > chosen.high[kind] {
         return;
     }
     let dims = vec3<i32>(params.dims);

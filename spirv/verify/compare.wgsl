@@ -10,10 +10,6 @@ struct CompareParams {
     by_brick: u32,
 }
 
-struct Todo {
-    brick: array<u32>,
-}
-
 struct Difference {
     compared: atomic<u32>,
     different: atomic<u32>,
@@ -23,11 +19,8 @@ struct Difference {
     recomputed: atomic<u32>,
 }
 
-#include "shared/bricks.wgsl"
-
-const CLIPPED = 0u;
-const AFFECTED = 1u;
-const UNTOUCHED = 2u;
+#include "shared/categories.wgsl"
+#include "shared/todo.wgsl"
 
 var<immediate> params: CompareParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
@@ -43,7 +36,7 @@ fn category_of(voxel: vec3<u32>) -> u32 {
     if params.by_brick == 0u {
         return textureLoad(mask, voxel, 0).r;
     }
-    let listed = todo.brick[brick_index(voxel / 8u, params.bricks)];
+    let listed = todo.brick[brick_index(voxel / BRICK, params.bricks)];
     return select(UNTOUCHED, AFFECTED, (listed & TODO) != 0u);
 }
 
@@ -78,14 +71,14 @@ fn compare(voxel: vec3<u32>) {
 }
 
 // One workgroup a brick; each invocation takes two slices.
-@compute @workgroup_size(8, 8, 4)
+@compute @workgroup_size(BRICK, BRICK, SLICES)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let entry = group.x + group.y * GROUPS_PER_ROW;
+    let entry = item_of_group(group);
     if entry >= list.count {
         return;
     }
-    let corner = brick_at(list.items[entry], params.bricks) * 8u;
-    for (var slice = 0u; slice < 8u; slice += 4u) {
+    let corner = brick_at(list.items[entry], params.bricks) * BRICK;
+    for (var slice = 0u; slice < BRICK; slice += SLICES) {
         let voxel = corner + local + vec3(0u, 0u, slice);
         if all(voxel < params.dims) {
             compare(voxel);

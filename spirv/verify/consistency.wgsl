@@ -8,7 +8,7 @@
 @group(0) @binding(3) var edge: sampler;
 @group(0) @binding(4) var<uniform> frame: Frame;
 @group(0) @binding(5) var<storage, read> points: Points;
-@group(0) @binding(6) var<storage, read_write> seen: Seen;
+@group(0) @binding(6) var<storage, read_write> seen: AllSeen;
 
 #include "shared/eyes.wgsl"
 
@@ -21,10 +21,20 @@ struct Points {
     world: array<vec4<f32>>,
 }
 
+// What one eye reads at one point.
 struct Seen {
-    // two entries a point, left and right: transmittance (-1: outside the image), ambient factor
-    by_eye: array<vec2<f32>>,
+    // transmittance between the eye and the point's voxel, 0 ... 1; OUTSIDE where the point is outside the eye's image
+    transmittance: f32,
+    // ambient factor at the point
+    ambient: f32,
 }
+
+struct AllSeen {
+    // two entries a point, left and right
+    by_eye: array<Seen>,
+}
+
+const OUTSIDE = -1.0;
 
 var<immediate> params: ConsistencyParams;
 
@@ -40,7 +50,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let uv = clip.xy / clip.w * 0.5 + 0.5;
         let out = 2u * id.x + view;
         if clip.w < eye.depth.z || any(uv < vec2(0.0)) || any(uv > vec2(1.0)) {
-            seen.by_eye[out] = vec2(-1.0, 0.0);
+            seen.by_eye[out] = Seen(OUTSIDE, 0.0);
             continue;
         }
         let ray = ray_through(eye, uv);
@@ -57,6 +67,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let a = textureSampleLevel(opacity, field, (ray.start + t * ray.along + 0.5) / frame.dims.xyz, 0.0).r;
             transmittance *= select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
         }
-        seen.by_eye[out] = vec2(transmittance, ambient_at(ray.start + clip.w * ray.along));
+        seen.by_eye[out] = Seen(transmittance, ambient_at(ray.start + clip.w * ray.along));
     }
 }

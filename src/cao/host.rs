@@ -3,6 +3,8 @@
 use crate::field::Field;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao_kernels::shared::bricks::GROUPS_PER_ROW;
+use cao_kernels::shared::parts::PARTS;
 
 /// Device memory with this content. Uses the device's queue and waits for it.
 pub fn device_buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Result<Buffer> {
@@ -19,9 +21,24 @@ pub fn device_buffer(gpu: &Gpu, name: &str, content: &[u8]) -> Result<Buffer> {
 
 /// Group counts for `n` workgroups when one axis may not hold them all; kernels drop the surplus.
 pub fn row_of_groups(n: u32) -> [u32; 3] {
-    const ROW: u32 = 65535;
-    [n.min(ROW), n.div_ceil(ROW), 1]
+    [n.min(GROUPS_PER_ROW), n.div_ceil(GROUPS_PER_ROW), 1]
 }
+
+/// Group counts for `n` invocations of such a kernel, whose workgroups lie along one axis.
+pub fn rows_over(n: u32, workgroup: [u32; 3]) -> [u32; 3] {
+    row_of_groups(n.div_ceil(workgroup[0]))
+}
+
+/// Two structs of kernels that are one to the host: what some kernels read as plain numbers, others write as atomics.
+macro_rules! same_layout {
+    ($one:ty, $other:ty { $($field:ident),+ }) => {
+        const _: () = {
+            assert!(size_of::<$one>() == size_of::<$other>());
+            $(assert!(::core::mem::offset_of!($one, $field) == ::core::mem::offset_of!($other, $field));)+
+        };
+    };
+}
+pub(crate) use same_layout;
 
 /// A 3D image of the field's size that kernels sample and store to.
 pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Result<Image> {
@@ -56,7 +73,7 @@ pub fn read_values(gpu: &Gpu, image: &Image) -> Result<Vec<f32>> {
     Ok(match image.desc().format {
         Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&texels)
             .into_iter()
-            .map(|texel| f32::from(texel) / 65535.0)
+            .map(|texel| f32::from(texel) / PARTS)
             .collect(),
         _ => bytemuck::pod_collect_to_vec(&texels),
     })

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
+use crate::clip::classify::{AFFECTED, CLIPPED, UNTOUCHED};
 use crate::drive::Part;
 use crate::field::bricks::BrickList;
 use crate::subject::Subject;
@@ -37,14 +38,15 @@ pub trait Ambient: Send + Sync {
         progress: &mut dyn FnMut(f64),
     ) -> Result<(Recomputation<'_>, Timings)>;
 
-    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched by the last update. Uses the device's queue and waits for it.
+    /// V_m, x fastest: [`CLIPPED`], [`AFFECTED`] or [`UNTOUCHED`] by the last update. Uses the device's queue and waits for it.
     fn mask(&self, on: &Subject) -> Result<Vec<u8>>;
 
     /// Voxels of each category after the last update. Uses the device's queue and waits for it.
     fn categories(&self, on: &Subject) -> Result<Categories> {
         let mask = self.mask(on)?;
-        let of = |category: u8| mask.iter().filter(|voxel| **voxel == category).count() as u32;
-        Ok(Categories { clipped: of(0), affected: of(1), untouched: of(2) })
+        Ok(Categories::each(|category| {
+            mask.iter().filter(|voxel| u32::from(**voxel) == category).count() as u32
+        }))
     }
 }
 
@@ -94,6 +96,13 @@ pub struct Categories {
     pub affected: u32,
     /// c: untouched.
     pub untouched: u32,
+}
+
+impl Categories {
+    /// What `of` says of each category, as the mask has it.
+    pub(crate) fn each(of: impl Fn(u32) -> u32) -> Self {
+        Self { clipped: of(CLIPPED), affected: of(AFFECTED), untouched: of(UNTOUCHED) }
+    }
 }
 
 /// What the library knows of a method beside its entry in [`cao_model::METHODS`].

@@ -8,7 +8,8 @@
 //!     └────── record_into(host's command buffer) ── … ── finish ── timings, later
 //! ```
 //!
-//! * Descriptors: one set, number 0, pushed with each command; hosts bind by the names in the WGSL.
+//! * Descriptors: one set, number 0, pushed with each command; hosts bind by the names in the WGSL,
+//!   a struct of them for each entry point of a built-in kernel ([`Bindings`]).
 //! * Images stay in the GENERAL layout from their first `discard` on.
 //! * Every barrier is one line that names both sides from the table in [`Access`]; [`hazard`] refuses commands that lack one.
 //! * Objects are freed when dropped, after the recorders that used them: a [`Recorder`] keeps what it refers to alive.
@@ -28,14 +29,17 @@ mod info;
 mod memory;
 mod pipeline;
 mod recorder;
-pub mod shader;
 mod timing;
 mod transfer;
 mod validation;
 
+/// What is known about a compiled shader.
+pub use cao_reflect as shader;
+
 pub use access::Access;
 pub use bind::{Bind, Bindings, Flat};
 pub use buffer::{Buffer, BufferUse};
+pub use cao_reflect::Shader;
 pub use device::{Adopted, Gpu, OpenOptions};
 pub use draw::Attachments;
 pub use error::{Error, Result};
@@ -44,7 +48,6 @@ pub use image::{Image, ImageDesc, ImageKind, ImageUse, Sampler, SamplerDesc};
 pub use info::{DeviceInfo, DeviceKind};
 pub use pipeline::{Blend, Cull, DepthTest, GraphicsDesc, Pipeline};
 pub use recorder::Recorder;
-pub use shader::Shader;
 pub use timing::{Phase, Recorded, Stage, Timing, Timings};
 pub use validation::ValidationLog;
 

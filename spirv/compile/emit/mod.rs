@@ -8,7 +8,6 @@
 
 mod bindings;
 mod items;
-mod legacy;
 mod shader;
 
 use super::{Item, Kernel, stem};
@@ -74,7 +73,6 @@ fn module(out: &mut String, kernel: &Kernel) -> Written {
     shader::shader(out, &kernel.shader)?;
     kernel.items.iter().filter(|item| item.file == *own).try_for_each(|i| items::item(out, kernel, i))?;
     bindings::all(out, kernel)?;
-    legacy::layouts(out, kernel)?;
     writeln!(out, "}}")
 }
 

@@ -10,40 +10,12 @@
 
 use crate::field::Field;
 use crate::field::bricks::BrickList;
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
-use cao_kernels as shaders;
-use cao_model::occlusion::Occlusion;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use cao_kernels::lao as kernel;
+use cao_model::occlusion::{Occlusion, Quadrature};
 use cao_model::settings::Scope;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    samples: u32,
-    bricks: [u32; 3],
-    rays: u32,
-    per_mm: [f32; 3],
-    first: f32,
-    step: f32,
-    exponent: f32,
-    quadrature: u32,
-    flags: u32,
-    base: u32,
-    pad: [u32; 3],
-}
-layout_check!(Params => shaders::lao::LAO_PARAMS {
-    dims, samples, bricks, rays, per_mm, first, step, exponent, quadrature, flags, base
-});
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Rays {
-    ray: [[f32; 4]; 54],
-}
-layout_check!(Rays => shaders::lao::RAYS { ray });
 
 /// How the listed bricks are worked on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,15 +52,15 @@ impl Lao {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
-            pipeline: gpu.compute(&shaders::lao::SHADER, "main")?,
+            pipeline: gpu.compute(&kernel::SHADER, "main")?,
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
-            rays: gpu.buffer("rays", size_of::<Rays>() as u64, BufferUse::Device)?,
+            rays: gpu.buffer("rays", size_of::<kernel::Rays>() as u64, BufferUse::Device)?,
         })
     }
 
     /// Writes the ray set; once after each change of the settings.
     pub fn record_rays(&self, rec: &mut Recorder, occlusion: &Occlusion) -> Result<()> {
-        let mut data = Rays::zeroed();
+        let mut data = kernel::Rays::zeroed();
         for (slot, (unit, weight)) in data.ray.iter_mut().zip(occlusion.rays.unit_vectors()) {
             *slot = unit.extend(weight).to_array();
         }
@@ -139,16 +111,16 @@ impl Lao {
         rec.dispatch(&self.pipeline, &self.binds(bindings), bytemuck::bytes_of(&params), groups)
     }
 
-    fn binds<'a>(&'a self, b: Bindings<'a>) -> [(&'static str, Bind<'a>); 7] {
-        [
-            ("opacity", Bind::Image(b.opacity)),
-            ("field", Bind::Sampler(&self.field)),
-            ("rays", Bind::Buffer(&self.rays)),
-            ("list", Bind::Buffer(&b.list.buffer)),
-            ("mask", Bind::Image(b.mask)),
-            ("precomputed", Bind::Image(b.precomputed)),
-            ("ambient", Bind::Image(b.ambient)),
-        ]
+    fn binds<'a>(&'a self, b: Bindings<'a>) -> kernel::MainBindings<'a> {
+        kernel::MainBindings {
+            opacity: b.opacity,
+            field: &self.field,
+            rays: &self.rays,
+            list: &b.list.buffer,
+            mask: b.mask,
+            precomputed: b.precomputed,
+            ambient: b.ambient,
+        }
     }
 }
 
@@ -159,10 +131,10 @@ fn params(
     scope: Scope,
     work: Work,
     base: u32,
-) -> Params {
+) -> kernel::LaoParams {
     let smallest = f64::from(field.min_spacing());
     let step = occlusion.step(smallest);
-    Params {
+    kernel::LaoParams {
         dims: field.dims,
         samples: occlusion.samples(smallest),
         bricks: field.bricks(),
@@ -171,9 +143,26 @@ fn params(
         first: occlusion.first(smallest),
         step,
         exponent: step / reference_mm,
-        quadrature: occlusion.quadrature as u32,
-        flags: u32::from(work == Work::ByMask) | u32::from(scope == Scope::Needed) << 1,
+        quadrature: match occlusion.quadrature {
+            Quadrature::Left => kernel::LEFT,
+            Quadrature::Cell => kernel::CELL,
+            Quadrature::Segment => kernel::SEGMENT,
+        },
+        flags: if work == Work::ByMask { kernel::BY_MASK } else { 0 }
+            | if scope == Scope::Needed { kernel::ONLY_NEEDED } else { 0 },
         base,
-        pad: [0; 3],
+        pad: Default::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cao_model::occlusion::RaySet;
+
+    #[test]
+    fn every_ray_set_fits_the_kernels() {
+        let most = RaySet::ALL.map(|set| set.directions().len()).into_iter().max();
+        assert_eq!(most, Some(kernel::MOST_RAYS as usize));
     }
 }

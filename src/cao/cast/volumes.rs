@@ -90,8 +90,7 @@ impl Kernels {
 
     /// What the last classification counted.
     pub(super) fn categories(&self, on: &Subject) -> crate::Result<Categories> {
-        let [clipped, affected, untouched] =
-            bytemuck::pod_read_unaligned(&read_buffer(&on.gpu, &self.classify.count)?);
-        Ok(Categories { clipped, affected, untouched })
+        let counted = read_buffer(&on.gpu, &self.classify.count)?;
+        Ok(Categories::each(|category| Classify::count_of(&counted, category)))
     }
 }

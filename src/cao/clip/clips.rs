@@ -8,51 +8,18 @@ use crate::clip::dilate::Dilate;
 use crate::clip::peel::{Layers, Peel};
 use crate::stages;
 use crate::{Error, Result};
-use bytemuck::{Pod, Zeroable};
-use cao_gpu::layout_check;
+use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
-use cao_kernels as shaders;
+use cao_kernels::shared::clip_bits::MOST_CLIPS;
+use cao_kernels::shared::clips::{self as kinds, Clips};
+use cao_kernels::shared::layers::{self, NO_BACK, NO_FRONT};
 use cao_model::clip::{Clip, ClipCamera, Mode, Shape};
 use cao_model::mesh::TriangleMesh;
 use cao_model::settings::MapSettings;
 use glam::Vec3;
 use std::sync::Arc;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct ClipData {
-    to_rigid: [[f32; 4]; 3],
-    scale: [f32; 4],
-    corner: [f32; 4],
-    kind: u32,
-    keep: u32,
-    pairs: u32,
-    layers_at: u32,
-    resolution: u32,
-    dilation_at: u32,
-    dilation_resolution: u32,
-    per_depth: f32,
-    cells: [f32; 4],
-    blocks_at: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
-}
-layout_check!(ClipData => shaders::classify::CLIP {
-    to_rigid, scale, corner, kind, keep, pairs, layers_at, resolution, dilation_at, dilation_resolution, per_depth, cells,
-    blocks_at, pad0, pad1, pad2
-});
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct ClipsData {
-    count: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
-    clip: [ClipData; Clip::MAX],
-}
-layout_check!(ClipsData => shaders::classify::CLIPS { count, pad0, pad1, pad2, clip });
+const _: () = assert!(MOST_CLIPS as usize == Clip::MAX);
 
 /// Where one mesh clip's maps are in the shared buffers.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +72,7 @@ impl ClipSet {
     /// No clips.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
-            clips: gpu.buffer("clips", size_of::<ClipsData>() as u64, BufferUse::Device)?,
+            clips: gpu.buffer("clips", size_of::<Clips>() as u64, BufferUse::Device)?,
             layers: gpu.buffer("clip layers", 16, BufferUse::Device)?,
             dilation: gpu.buffer("dilation maps", 16, BufferUse::Device)?,
             peeled: Vec::new(),
@@ -225,7 +192,7 @@ impl ClipSet {
     /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
     pub fn record(&self, rec: &mut Recorder, clips: &[Clip], half_mm: f32) -> Result<()> {
         check(clips)?;
-        let mut data = ClipsData::zeroed();
+        let mut data = Clips::zeroed();
         data.count = clips.len() as u32;
         let mut meshes = self.meshes.iter();
         for (slot, clip) in data.clip.iter_mut().zip(clips) {
@@ -236,12 +203,12 @@ impl ClipSet {
             slot.keep = u32::from(clip.mode == Mode::Keep);
             slot.cells[3] = clip.rounding_mm(half_mm, 0.0);
             slot.kind = match &clip.shape {
-                Shape::Plane => 0,
-                Shape::Box => 1,
-                Shape::Sphere => 2,
-                Shape::Cylinder => 3,
-                Shape::Cone => 4,
-                Shape::Torus => 5,
+                Shape::Plane => kinds::PLANE,
+                Shape::Box => kinds::BOX,
+                Shape::Sphere => kinds::SPHERE,
+                Shape::Cylinder => kinds::CYLINDER,
+                Shape::Cone => kinds::CONE,
+                Shape::Torus => kinds::TORUS,
                 Shape::Mesh(mesh) => {
                     let map = meshes.next().ok_or_else(|| {
                         Error::refused(&format!("clip {}", mesh.name), "its depth layers were not prepared")
@@ -256,7 +223,7 @@ impl ClipSet {
                     let corner = map.cells.corner;
                     slot.cells[..3].copy_from_slice(&[corner.x, corner.y, 1.0 / map.cells.pixel_mm]);
                     slot.per_depth = 1.0 / map.camera.depth_mm;
-                    6
+                    kinds::MESH
                 }
             };
         }
@@ -268,26 +235,26 @@ impl ClipSet {
 }
 
 /// Edge in pixels of the blocks of depth layers that `clip_bricks` looks at instead of pixels.
-const BLOCK: usize = 16;
+const BLOCK: usize = layers::BLOCK as usize;
 
 /// Of layers as [`Layers::depth`] has them, for each pair: nearest front, farthest back, farthest front and nearest back
-/// of each block of 16² pixels, rows of y. A pixel with nothing inside counts as front 2 and back −1, behind and before
+/// of each block of pixels, rows of y. A pixel with nothing inside counts as [`NO_FRONT`] and [`NO_BACK`], behind and before
 /// everything.
 fn block_bounds(depth: &[f32], resolution: usize) -> Vec<f32> {
     let edge = resolution.div_ceil(BLOCK);
     let mut bounds = Vec::new();
     for pair in depth.chunks_exact(2 * resolution * resolution) {
         let (front, back) = pair.split_at(resolution * resolution);
-        let mut pair = [(); 4].map(|()| Vec::with_capacity(edge * edge));
+        let mut pair = [(); layers::BLOCK_BOUNDS as usize].map(|()| Vec::with_capacity(edge * edge));
         for block in 0..edge * edge {
             let range = |at: usize| at * BLOCK..((at + 1) * BLOCK).min(resolution);
-            let mut b = [2.0_f32, -1.0, -1.0, 2.0];
+            let mut b = [NO_FRONT, NO_BACK, NO_BACK, NO_FRONT];
             for pixel in
                 range(block / edge).flat_map(|y| range(block % edge).map(move |x| y * resolution + x))
             {
                 let (f, k) = match (front[pixel], back[pixel]) {
                     (f, k) if f < k => (f, k),
-                    _ => (2.0, -1.0),
+                    _ => (NO_FRONT, NO_BACK),
                 };
                 b = [b[0].min(f), b[1].max(k), b[2].max(f), b[3].min(k)];
             }

@@ -6,30 +6,9 @@
 //! literal recipe (D = Z, distances between centres) is kept to show that it is not. Cost: (2·radius/cell)² reads a cell.
 
 use crate::clip::clips::MeshClip;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder};
-use cao_kernels as shaders;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    resolution: u32,
-    cells: u32,
-    layers_at: u32,
-    dilation_at: u32,
-    radius: f32,
-    cell_mm: f32,
-    depth_mm: f32,
-    flags: u32,
-    first: [f32; 2],
-    per_cell: f32,
-    pad: u32,
-}
-layout_check!(Params => shaders::dilate::DILATE_PARAMS {
-    resolution, cells, layers_at, dilation_at, radius, cell_mm, depth_mm, flags, first, per_cell
-});
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Pipeline, Recorder};
+use cao_kernels::dilate as kernel;
 
 /// The kernel `dilate`.
 pub struct Dilate {
@@ -41,8 +20,8 @@ impl Dilate {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
-            reduce: gpu.compute(&shaders::dilate::SHADER, "reduce")?,
-            main: gpu.compute(&shaders::dilate::SHADER, "main")?,
+            reduce: gpu.compute(&kernel::SHADER, "reduce")?,
+            main: gpu.compute(&kernel::SHADER, "main")?,
         })
     }
 
@@ -62,7 +41,7 @@ impl Dilate {
         dilation: &Buffer,
     ) -> Result<()> {
         let camera = clip.camera;
-        let params = Params {
+        let params = kernel::DilateParams {
             resolution: camera.resolution,
             cells: clip.cells.resolution,
             layers_at: clip.layers_at,
@@ -70,17 +49,17 @@ impl Dilate {
             radius,
             cell_mm: clip.cells.pixel_mm,
             depth_mm: camera.depth_mm,
-            flags: u32::from(clip.keep) | u32::from(clip.literal) << 1,
+            flags: if clip.keep { kernel::KEEP } else { 0 } | if clip.literal { kernel::LITERAL } else { 0 },
             first: ((clip.cells.corner - camera.corner) / camera.pixel_mm).truncate().to_array(),
             per_cell: clip.cells.pixel_mm / camera.pixel_mm,
-            pad: 0,
+            pad: Default::default(),
         };
         let over = [clip.cells.resolution, clip.cells.resolution, clip.pairs];
         let push = bytemuck::bytes_of(&params);
-        let binds = [("layers", Bind::Buffer(layers)), ("blocks", Bind::Buffer(blocks))];
+        let binds = kernel::ReduceBindings { layers, blocks };
         rec.dispatch_over(&self.reduce, &binds, push, over)?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
-        let binds = [("blocks", Bind::Buffer(blocks)), ("dilation", Bind::Buffer(dilation))];
+        let binds = kernel::MainBindings { blocks, dilation };
         rec.dispatch_over(&self.main, &binds, push, over)
     }
 }

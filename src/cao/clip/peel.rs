@@ -7,13 +7,12 @@
 
 use crate::Result;
 use crate::stages;
-use bytemuck::{Pod, Zeroable};
-use cao_gpu::layout_check;
 use cao_gpu::{
-    Access, Attachments, Bind, BufferUse, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, ImageDesc,
+    Access, Attachments, BufferUse, Cull, DepthTest, Flat, Format, Gpu, GraphicsDesc, Image, ImageDesc,
     ImageKind, ImageUse, Pipeline,
 };
-use cao_kernels as shaders;
+use cao_kernels::peel as kernel;
+use cao_kernels::shared::layers::EMPTY;
 use cao_model::clip::{Clip, ClipCamera};
 use cao_model::mesh::TriangleMesh;
 use cao_model::settings::MapSettings;
@@ -22,25 +21,13 @@ use glam::Vec3;
 /// Most layer pairs of a mesh.
 pub const MAX_PAIRS: u32 = MapSettings::MAX_PAIRS;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    corner: [f32; 3],
-    per_half: f32,
-    scale: [f32; 3],
-    per_depth: f32,
-    first: u32,
-    pad: [u32; 3],
-}
-layout_check!(Params => shaders::peel::PEEL_PARAMS { corner, per_half, scale, per_depth, first });
-
 /// The depth layers of one mesh.
 pub struct Layers {
     /// The clip camera they were drawn from.
     pub camera: ClipCamera,
     /// Layer pairs that hold anything, at least 1.
     pub pairs: u32,
-    /// `pairs` × (front, back) × resolution² depths, rows of y, x fastest; empty pixels 1.
+    /// `pairs` × (front, back) × resolution² depths, rows of y, x fastest; empty pixels [`EMPTY`].
     pub depth: Vec<f32>,
     /// Time that drawing them took on the device.
     pub milliseconds: f64,
@@ -57,7 +44,7 @@ impl Peel {
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let facing = |cull| {
             gpu.graphics(
-                &shaders::peel::SHADER,
+                &kernel::SHADER,
                 &GraphicsDesc {
                     vertex: "vertex",
                     fragment: "fragment",
@@ -106,13 +93,13 @@ impl Peel {
             let mut before = depth_image(gpu, edge)?;
             let mut now = depth_image(gpu, edge)?;
             for layer in 0..=max_pairs {
-                let params = Params {
+                let params = kernel::PeelParams {
                     corner: camera.corner.to_array(),
                     per_half: 2.0 / (camera.pixel_mm * edge as f32),
                     scale: scale.to_array(),
                     per_depth: 1.0 / camera.depth_mm,
                     first: u32::from(layer == 0),
-                    pad: [0; 3],
+                    pad: Default::default(),
                 };
                 let mut rec = gpu.recorder("peel")?;
                 if layer == 0 {
@@ -123,11 +110,11 @@ impl Peel {
                 rec.stage(stages::PEEL)?;
                 rec.draw(
                     pipeline,
-                    &[("vertices", Bind::Buffer(&vertices)), ("before", Bind::Image(&before))],
+                    &kernel::DrawBindings { vertices: &vertices, before: Flat::Only(&before) },
                     bytemuck::bytes_of(&params),
                     Attachments {
                         colours: &[],
-                        depth: Some((&now, Some(1.0))),
+                        depth: Some((&now, Some(EMPTY))),
                         layer: None,
                         size: [edge, edge],
                     },
@@ -139,7 +126,7 @@ impl Peel {
                 rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
                 milliseconds += rec.submit_and_wait()?.total();
                 let map: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
-                if map.iter().all(|&z| z >= 1.0) {
+                if map.iter().all(|&z| z >= EMPTY) {
                     break;
                 }
                 maps.push(map);
@@ -148,7 +135,7 @@ impl Peel {
         }
         let pairs = check(mesh, &maps, edge, max_pairs)?;
 
-        let empty = vec![1.0; (edge * edge) as usize];
+        let empty = vec![EMPTY; (edge * edge) as usize];
         let layer = |side: usize, pair: usize| maps[side].get(pair).unwrap_or(&empty);
         let depth = (0..pairs as usize)
             .flat_map(|pair| [layer(0, pair), layer(1, pair)])
@@ -183,7 +170,7 @@ fn check(
     let found = fronts.len().max(backs.len());
     if found > max_pairs as usize {
         let beyond = |maps: &[Vec<f32>]| {
-            maps.get(max_pairs as usize).map_or(0, |map| map.iter().filter(|&&z| z < 1.0).count())
+            maps.get(max_pairs as usize).map_or(0, |map| map.iter().filter(|&&z| z < EMPTY).count())
         };
         // Turning the clip is no remedy: its camera turns with it. Turning the vertices within their file is one.
         let more = match max_pairs < MAX_PAIRS {
@@ -199,9 +186,9 @@ fn check(
             Clip::MAX
         ));
     }
-    let at = |maps: &[Vec<f32>], layer: usize, pixel: usize| maps.get(layer).map_or(1.0, |map| map[pixel]);
+    let at = |maps: &[Vec<f32>], layer: usize, pixel: usize| maps.get(layer).map_or(EMPTY, |map| map[pixel]);
     let mut odd = (0..(edge * edge) as usize)
-        .filter(|&pixel| (0..found).any(|k| (at(fronts, k, pixel) < 1.0) != (at(backs, k, pixel) < 1.0)));
+        .filter(|&pixel| (0..found).any(|k| (at(fronts, k, pixel) < EMPTY) != (at(backs, k, pixel) < EMPTY)));
     if let Some(first) = odd.next() {
         return refuse(format!(
             "front and back layers differ in number at {} of {} pixels of the clip camera, first at ({}, {}): the mesh is open or \

@@ -2,25 +2,15 @@
 //! (distance-based empty-space skipping, after Deakin and Knackstedt 2020, on bricks),
 //! `d(b) = min { max(|b_x − c_x|, |b_y − c_y|, |b_z − c_z|) : c shows something }`, in three passes, one an axis.
 //!
-//! In: `occupancy`, the words of `clip_bricks`. Out: `distances`, one u32 a brick, x fastest: bits 0 … 11 the distance to the
-//! nearest brick with opacity, 12 … 23 to the nearest with opacity that the clips do not hide as a whole (4095: there
-//! is none), 24 … 31 a bit for each clip that hides any of what a ray reads in the brick. Cost: bricks × the distances found.
+//! In: `occupancy`, the words of `clip_bricks`. Out: `distances`, one u32 a brick, x fastest (`spirv/shared/distances.wgsl`): the
+//! distance to the nearest brick with opacity, that to the nearest with opacity that the clips do not hide as a whole, and a bit
+//! for each clip that hides any of what a ray reads in the brick. Cost: bricks × the distances found.
 
 use crate::field::Field;
-use crate::host::row_of_groups;
-use bytemuck::{Pod, Zeroable};
+use crate::host::rows_over;
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Pipeline, Recorder};
-use cao_kernels as shaders;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    bricks: [u32; 3],
-    axis: u32,
-}
-layout_check!(Params => shaders::brick_distance::BRICK_DISTANCE_PARAMS { bricks, axis });
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Pipeline, Recorder};
+use cao_kernels::brick_distance as kernel;
 
 /// The kernel `brick_distance`, and memory between its passes.
 pub struct BrickDistance {
@@ -33,8 +23,8 @@ impl BrickDistance {
     /// Builds the pipelines, for a field of this size.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
         Ok(Self {
-            first: gpu.compute(&shaders::brick_distance::SHADER, "first")?,
-            next: gpu.compute(&shaders::brick_distance::SHADER, "next")?,
+            first: gpu.compute(&kernel::SHADER, "first")?,
+            next: gpu.compute(&kernel::SHADER, "next")?,
             between: Self::buffer(gpu, field)?,
         })
     }
@@ -53,20 +43,17 @@ impl BrickDistance {
         clip_bricks: &Buffer,
         distances: &Buffer,
     ) -> Result<()> {
-        let groups = row_of_groups(field.brick_count().div_ceil(64));
-        let params = |axis| Params { bricks: field.bricks(), axis };
-        let binds = [
-            ("occupancy", Bind::Buffer(occupancy)),
-            ("clip_bricks", Bind::Buffer(clip_bricks)),
-            ("distances", Bind::Buffer(distances)),
-        ];
+        const { assert!(kernel::FIRST_WORKGROUP[0] == kernel::NEXT_WORKGROUP[0]) };
+        let groups = rows_over(field.brick_count(), kernel::FIRST_WORKGROUP);
+        let params = |axis| kernel::BrickDistanceParams { bricks: field.bricks(), axis };
+        let binds = kernel::FirstBindings { occupancy, clip_bricks, distances };
         rec.dispatch(&self.first, &binds, bytemuck::bytes_of(&params(0)), groups)?;
-        for (axis, from, to) in [(1, distances, &self.between), (2, &self.between, distances)] {
+        for (axis, before, distances) in [(1, distances, &self.between), (2, &self.between, distances)] {
             rec.barrier(
                 &[Access::StorageRead, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite],
             );
-            let binds = [("before", Bind::Buffer(from)), ("distances", Bind::Buffer(to))];
+            let binds = kernel::NextBindings { before, distances };
             rec.dispatch(&self.next, &binds, bytemuck::bytes_of(&params(axis)), groups)?;
         }
         Ok(())

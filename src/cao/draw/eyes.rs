@@ -2,45 +2,14 @@
 
 use crate::Result;
 use crate::field::Field;
-use bytemuck::{Pod, Zeroable};
-use cao_gpu::layout_check;
+use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
-use cao_kernels as shaders;
+use cao_kernels::shared::eyes::{Eye, Frame, MOST_VIEWS};
 use cao_model::look::Look;
 use cao_model::view::View;
 use glam::{Vec2, Vec3};
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Eye {
-    origin: [f32; 4],
-    base: [f32; 4],
-    along_u: [f32; 4],
-    along_v: [f32; 4],
-    depth: [f32; 4],
-    view_projection: [[f32; 4]; 4],
-}
-layout_check!(Eye => shaders::raycast::EYE { origin, base, along_u, along_v, depth, view_projection });
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Frame {
-    eye: [Eye; View::MAX],
-    dims: [f32; 4],
-    spacing: [f32; 4],
-    light: [f32; 4],
-    ambient: f32,
-    diffuse: f32,
-    remainder: f32,
-    bias: f32,
-    scale: f32,
-    occluded: f32,
-    jitter: f32,
-    gain: f32,
-}
-layout_check!(Frame => shaders::raycast::FRAME {
-    eye, dims, spacing, light, ambient, diffuse, remainder, bias, scale, occluded, jitter, gain
-});
+const _: () = assert!(MOST_VIEWS as usize == View::MAX);
 
 /// Most samples on a ray. A frame of more is no better and keeps a device busy for so long that its driver gives up.
 const MAX_SAMPLES: f32 = 1e5;

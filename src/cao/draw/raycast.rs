@@ -9,22 +9,13 @@ use crate::clip::clips::ClipSet;
 use crate::draw::eyes::{FrameBuffer, check_count};
 use crate::field::Field;
 use crate::field::transfer::TransferBuffer;
-use bytemuck::{Pod, Zeroable};
-use cao_gpu::layout_check;
 use cao_gpu::{
-    Attachments, Bind, Buffer, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder,
-    Sampler, SamplerDesc,
+    Attachments, Buffer, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder, Sampler,
+    SamplerDesc,
 };
-use cao_kernels as shaders;
+use cao_kernels::raycast as kernel;
 use cao_model::view::View;
 use std::sync::OnceLock;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    size: [f32; 2],
-}
-layout_check!(Params => shaders::raycast::RAYCAST_PARAMS { size });
 
 /// What the kernel reads.
 #[derive(Clone, Copy)]
@@ -77,7 +68,7 @@ impl Raycast {
             return Ok(pipeline);
         }
         let pipeline = self.gpu.graphics(
-            &shaders::raycast::SHADER,
+            &kernel::SHADER,
             &GraphicsDesc {
                 vertex: "vertex",
                 fragment: "fragment",
@@ -105,25 +96,31 @@ impl Raycast {
         size: [u32; 2],
     ) -> Result<()> {
         let b = bindings;
-        let params = Params { size: size.map(|s| s as f32) };
-        let binds = [
-            ("volume", Bind::Image(&b.field.volume)),
-            ("transfer", Bind::Buffer(&b.transfer.buffer)),
-            ("opacity", Bind::Image(b.opacity)),
-            ("ambient", Bind::Image(b.ambient)),
-            ("field", Bind::Sampler(&self.field)),
-            ("edge", Bind::Sampler(&self.edge)),
-            ("frame", Bind::Buffer(&b.frame.buffer)),
-            ("distances", Bind::Buffer(b.distances)),
-            ("clips", Bind::Buffer(&b.clips.clips)),
-            ("layers", Bind::Buffer(&b.clips.layers)),
-        ];
+        let params = kernel::RaycastParams { size: size.map(|s| s as f32) };
+        let binds = kernel::DrawBindings {
+            volume: &b.field.volume,
+            transfer: &b.transfer.buffer,
+            opacity: b.opacity,
+            ambient: b.ambient,
+            field: &self.field,
+            edge: &self.edge,
+            frame: &b.frame.buffer,
+            distances: b.distances,
+            clips: &b.clips.clips,
+            layers: &b.clips.layers,
+        };
         let attachments = Attachments {
             colours: &[(colour, Some([0.0; 4]))],
             depth: Some((depth, Some(1.0))),
             layer: None,
             size,
         };
-        Ok(rec.draw(self.pipeline(views)?, &binds, bytemuck::bytes_of(&params), attachments, 6)?)
+        Ok(rec.draw(
+            self.pipeline(views)?,
+            &binds,
+            bytemuck::bytes_of(&params),
+            attachments,
+            kernel::CORNERS,
+        )?)
     }
 }

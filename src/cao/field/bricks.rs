@@ -5,32 +5,25 @@
 //! two reads a voxel.
 
 use crate::field::Field;
-use crate::host::{device_buffer, row_of_groups};
-use bytemuck::{Pod, Zeroable};
+use crate::host::{device_buffer, row_of_groups, same_layout};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
+use cao_kernels::bricks as kernel;
+use cao_kernels::shared::bricks::BrickList as Head;
+use cao_kernels::shared::growing::GrowingList;
+use std::mem::offset_of;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    mode: u32,
-    bricks: [u32; 3],
-    pad: u32,
-}
-layout_check!(Params => shaders::bricks::BRICKS_PARAMS { dims, mode, bricks });
+same_layout!(Head, GrowingList { groups_x, groups_y, groups_z, count });
 
 /// Which bricks are listed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
     /// Every brick.
-    All = 0,
+    All = kernel::ALL as isize,
     /// Bricks with opacity in a voxel or a neighbour of one.
-    Needed = 1,
+    Needed = kernel::NEEDED as isize,
     /// Bricks in which the clips changed a voxel's neighbourhood, now or at the last update.
-    Changed = 2,
+    Changed = kernel::CHANGED as isize,
 }
 
 /// A list of bricks in device memory.
@@ -41,7 +34,7 @@ pub struct BrickList {
 
 impl BrickList {
     /// Byte offset of the number of bricks.
-    pub const COUNT_AT: u64 = 12;
+    pub const COUNT_AT: u64 = offset_of!(Head, count) as u64;
 
     /// Memory for all bricks of a field.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
@@ -50,17 +43,17 @@ impl BrickList {
 
     /// Memory for so many bricks.
     pub fn with_room(gpu: &Gpu, bricks: u32) -> Result<Self> {
-        let bytes = 16 + 4 * u64::from(bricks);
+        let bytes = Head::ITEMS_AT + size_of::<u32>() as u64 * u64::from(bricks);
         Ok(Self { buffer: gpu.buffer("brick list", bytes, BufferUse::Device)? })
     }
 
     /// A list of these bricks. Uses the device's queue and waits for it.
     pub fn of(gpu: &Gpu, bricks: &[u32]) -> Result<Self> {
         let count = bricks.len() as u32;
-        let [x, y, _] = row_of_groups(count);
-        let mut content = vec![x, y, 1, count];
-        content.extend(bricks);
-        Ok(Self { buffer: device_buffer(gpu, "brick list", bytemuck::cast_slice(&content))? })
+        let [groups_x, groups_y, groups_z] = row_of_groups(count);
+        let head = Head { groups_x, groups_y, groups_z, count };
+        let content = [bytemuck::bytes_of(&head), bytemuck::cast_slice(bricks)].concat();
+        Ok(Self { buffer: device_buffer(gpu, "brick list", &content)? })
     }
 
     /// Empties the list, for a kernel that fills it.
@@ -69,7 +62,11 @@ impl BrickList {
             &[Access::IndirectRead, Access::StorageRead],
             &[Access::TransferWrite, Access::StorageWrite],
         );
-        rec.update(&self.buffer, 0, bytemuck::bytes_of(&[0_u32, 0, 1, 0]))?;
+        rec.update(
+            &self.buffer,
+            0,
+            bytemuck::bytes_of(&Head { groups_x: 0, groups_y: 0, groups_z: 1, count: 0 }),
+        )?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         Ok(())
     }
@@ -83,7 +80,7 @@ pub struct Bricks {
 impl Bricks {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::bricks::SHADER, "main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Fills the list and makes it visible to indirect dispatches and compute shaders. `changed_before` holds a u32 a
@@ -100,13 +97,13 @@ impl Bricks {
         list: &BrickList,
     ) -> Result<()> {
         list.record_clear(rec)?;
-        let params = Params { dims: field.dims, mode: which as u32, bricks: field.bricks(), pad: 0 };
-        let binds = [
-            ("opacity", Bind::Image(opacity)),
-            ("mask", Bind::Image(mask)),
-            ("changed_before", Bind::Buffer(changed_before)),
-            ("list", Bind::Buffer(&list.buffer)),
-        ];
+        let params = kernel::BricksParams {
+            dims: field.dims,
+            mode: which as u32,
+            bricks: field.bricks(),
+            pad: Default::default(),
+        };
+        let binds = kernel::MainBindings { opacity, mask, changed_before, list: &list.buffer };
         let groups = row_of_groups(field.brick_count());
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
         rec.barrier(

@@ -14,8 +14,7 @@ use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, Image
 use cao_model::values::Values;
 use cao_model::volume::Volume;
 
-/// Edge of a brick in voxels, as the kernels have it.
-pub const BRICK: u32 = 8;
+pub use cao_kernels::shared::bricks::BRICK;
 
 /// A volume on the device.
 pub struct Field {

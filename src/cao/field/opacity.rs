@@ -4,22 +4,9 @@
 
 use crate::field::Field;
 use crate::field::transfer::TransferBuffer;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Bind, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    levels: f32,
-    slope: f32,
-    bias: f32,
-    pad: [u32; 2],
-}
-layout_check!(Params => shaders::opacity::OPACITY_PARAMS { dims, levels, slope, bias });
+use cao_gpu::{Gpu, Image, Pipeline, Recorder};
+use cao_kernels::opacity as kernel;
 
 /// The kernel `opacity`.
 pub struct Opacity {
@@ -29,7 +16,7 @@ pub struct Opacity {
 impl Opacity {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::opacity::SHADER, "main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Classifies every voxel.
@@ -41,12 +28,9 @@ impl Opacity {
         full_opacity: &Image,
     ) -> Result<()> {
         let Field { dims, levels, bias, .. } = *field;
-        let params = Params { dims, levels, slope: field.scale / levels, bias, pad: [0; 2] };
-        let binds = [
-            ("volume", Bind::Image(&field.volume)),
-            ("transfer", Bind::Buffer(&transfer.buffer)),
-            ("full_opacity", Bind::Image(full_opacity)),
-        ];
+        let slope = field.scale / levels;
+        let params = kernel::OpacityParams { dims, levels, slope, bias, pad: Default::default() };
+        let binds = kernel::MainBindings { volume: &field.volume, transfer: &transfer.buffer, full_opacity };
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)
     }
 }

@@ -1,25 +1,12 @@
 //! The transfer function on the device (`spirv/shared/transfer.wgsl`): its control points, 2 KiB.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use cao_gpu::Result;
-use cao_gpu::layout_check;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
-use cao_kernels as shaders;
-use cao_model::transfer::TransferFunction;
+use cao_kernels::shared::transfer::{MOST_POINTS, Transfer};
+use cao_model::transfer::{MAX_POINTS, TransferFunction};
 
-const POINTS: usize = 64;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Transfer {
-    opacity_points: u32,
-    colour_points: u32,
-    pad0: u32,
-    pad1: u32,
-    opacity: [[f32; 4]; POINTS],
-    colour: [[f32; 4]; POINTS],
-}
-layout_check!(Transfer => shaders::opacity::TRANSFER { opacity_points, colour_points, pad0, pad1, opacity, colour });
+const _: () = assert!(MOST_POINTS as usize == MAX_POINTS);
 
 /// Control points of a transfer function in device memory.
 pub struct TransferBuffer {

@@ -11,30 +11,12 @@ use crate::clip::clips::ClipSet;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use crate::field::transfer::TransferBuffer;
-use crate::host::row_of_groups;
+use crate::host::rows_over;
 use crate::sweep::past::PastBricks;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
+use cao_gpu::{Access, Buffer, Gpu, Image, Pipeline, Recorder};
+use cao_kernels::carve as kernel;
 use cao_model::settings::AntiAliasing;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    extra_samples: u32,
-    spacing: [f32; 3],
-    all: u32,
-    levels: f32,
-    slope: f32,
-    bias: f32,
-    capacity: u32,
-}
-layout_check!(Params => shaders::carve::CARVE_PARAMS {
-    dims, extra_samples, spacing, all, levels, slope, bias, capacity
-});
 
 /// What the kernel reads and writes.
 #[derive(Clone, Copy)]
@@ -72,7 +54,7 @@ pub struct Carve {
 impl Carve {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let shader = &shaders::carve::SHADER;
+        let shader = &kernel::SHADER;
         Ok(Self { choose: gpu.compute(shader, "list_bricks")?, carve: gpu.compute(shader, "main")? })
     }
 
@@ -89,7 +71,7 @@ impl Carve {
     ) -> Result<()> {
         let Field { dims, spacing, levels, bias, .. } = *field;
         let slope = field.scale / levels;
-        let params = Params {
+        let params = kernel::CarveParams {
             dims,
             extra_samples: samples as u32,
             spacing,
@@ -104,33 +86,34 @@ impl Carve {
         b.past.list.record_clear(rec)?;
         rec.fill(b.todo, 0, b.todo.bytes(), 0)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-        let binds = [
-            ("clip_bricks", Bind::Buffer(b.clip_bricks)),
-            ("clip_bricks_before", Bind::Buffer(b.clip_bricks_before)),
-            ("occupancy", Bind::Buffer(b.occupancy)),
-            ("contact", Bind::Buffer(b.contact)),
-            ("growing", Bind::Buffer(&b.list.buffer)),
-        ];
-        rec.dispatch(&self.choose, &binds, params, row_of_groups(field.brick_count().div_ceil(64)))?;
+        let binds = kernel::ListBricksBindings {
+            clip_bricks: b.clip_bricks,
+            clip_bricks_before: b.clip_bricks_before,
+            occupancy: b.occupancy,
+            contact: b.contact,
+            growing: &b.list.buffer,
+        };
+        let groups = rows_over(field.brick_count(), kernel::LIST_BRICKS_WORKGROUP);
+        rec.dispatch(&self.choose, &binds, params, groups)?;
         rec.barrier(
             &[Access::StorageRead, Access::StorageWrite],
             &[Access::IndirectRead, Access::StorageRead, Access::StorageWrite],
         );
-        let binds = [
-            ("volume", Bind::Image(&field.volume)),
-            ("transfer", Bind::Buffer(&b.transfer.buffer)),
-            ("clips", Bind::Buffer(&b.clips.clips)),
-            ("layers", Bind::Buffer(&b.clips.layers)),
-            ("positions", Bind::Buffer(&classify.positions)),
-            ("clip_bricks", Bind::Buffer(b.clip_bricks)),
-            ("contact", Bind::Buffer(b.contact)),
-            ("change", Bind::Buffer(b.change)),
-            ("list", Bind::Buffer(&b.list.buffer)),
-            ("changed", Bind::Buffer(&b.past.list.buffer)),
-            ("past", Bind::Buffer(&b.past.opacities)),
-            ("todo", Bind::Buffer(b.todo)),
-            ("opacity", Bind::Image(b.opacity)),
-        ];
+        let binds = kernel::MainBindings {
+            volume: &field.volume,
+            transfer: &b.transfer.buffer,
+            clips: &b.clips.clips,
+            layers: &b.clips.layers,
+            positions: &classify.positions,
+            clip_bricks: b.clip_bricks,
+            contact: b.contact,
+            change: b.change,
+            list: &b.list.buffer,
+            changed: &b.past.list.buffer,
+            past: &b.past.opacities,
+            todo: b.todo,
+            opacity: b.opacity,
+        };
         rec.dispatch_indirect(&self.carve, &binds, params, &b.list.buffer, 0)
     }
 }

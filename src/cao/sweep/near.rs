@@ -7,57 +7,18 @@
 //! reads a brick and axis.
 
 use crate::field::Field;
-use crate::host::row_of_groups;
+use crate::host::rows_over;
 use crate::sweep::past::PastBricks;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, Gpu, Pipeline, Recorder};
-use cao_kernels as shaders;
+use cao_gpu::{Access, Buffer, Gpu, Pipeline, Recorder};
+use cao_kernels::near as kernel;
 use cao_model::settings::Scope;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    bricks: [u32; 3],
-    axis: u32,
-    spacing: [f32; 3],
-    reach: f32,
-    unneeded: u32,
-    anew: u32,
-    capacity: u32,
-    pad: u32,
-}
-layout_check!(Params => shaders::near::NEAR_PARAMS {
-    bricks, axis, spacing, reach, unneeded, anew, capacity
-});
+pub use cao_kernels::shared::todo::{ANEW, CHANGED, TODO};
+pub use kernel::{Chosen, FAR};
 
-/// In a brick's word: its values are to be computed or amended.
-pub const TODO: u32 = 1;
-/// In a brick's word: they are to be computed anew.
-pub const ANEW: u32 = 2;
-/// In a brick's word: the first of eight bits, one for each octant x + 2 y + 4 z, that an opacity in it changed.
-pub const CHANGED: u32 = 256;
-
-/// What was chosen, in all.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-pub struct Chosen {
-    /// Bricks to do.
-    pub bricks: u32,
-    /// Least place x, y, z of the bricks to compute anew, then of those that changed.
-    pub low: [u32; 6],
-    /// Greatest place of the same.
-    pub high: [u32; 6],
-}
-layout_check!(Chosen => shaders::near::CHOSEN { bricks, low, high });
-
-impl Chosen {
-    const NONE: Self = Self { bricks: 0, low: [u32::MAX; 6], high: [0; 6] };
-}
-
-/// Bits of a squared distance that is farther than any volume reaches.
-pub const FAR: u32 = 0x7e00_0000;
+/// Nothing yet.
+const NONE: Chosen = Chosen { bricks: 0, low: [u32::MAX; 6], high: [0; 6] };
 
 /// What the kernel reads and writes.
 #[derive(Clone, Copy)]
@@ -89,7 +50,7 @@ pub struct Near {
 impl Near {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let shader = &shaders::near::SHADER;
+        let shader = &kernel::SHADER;
         Ok(Self { spread: gpu.compute(shader, "spread")?, choose: gpu.compute(shader, "choose")? })
     }
 
@@ -103,8 +64,9 @@ impl Near {
         anew: bool,
         b: Bindings,
     ) -> Result<()> {
-        let groups = row_of_groups(field.brick_count().div_ceil(64));
-        let mut params = Params {
+        const { assert!(kernel::SPREAD_WORKGROUP[0] == kernel::CHOOSE_WORKGROUP[0]) };
+        let groups = rows_over(field.brick_count(), kernel::CHOOSE_WORKGROUP);
+        let mut params = kernel::NearParams {
             bricks: field.bricks(),
             axis: 0,
             spacing: field.spacing,
@@ -112,29 +74,29 @@ impl Near {
             unneeded: u32::from(scope == Scope::All),
             anew: u32::from(anew),
             capacity: b.past.capacity,
-            pad: 0,
+            pad: Default::default(),
         };
         let between = [Access::StorageRead, Access::StorageWrite];
         let (mut before, mut after) = (b.change, b.other);
         rec.barrier(&[Access::TransferRead, Access::StorageRead], &[Access::TransferWrite]);
-        rec.update(b.chosen, 0, bytemuck::bytes_of(&Chosen::NONE))?;
+        rec.update(b.chosen, 0, bytemuck::bytes_of(&NONE))?;
         rec.barrier(&[Access::TransferWrite], &between);
         for axis in 0..3 {
             params.axis = axis;
-            let binds = [("before", Bind::Buffer(before)), ("after", Bind::Buffer(after))];
+            let binds = kernel::SpreadBindings { before, after };
             rec.dispatch(&self.spread, &binds, bytemuck::bytes_of(&params), groups)?;
             rec.barrier(&between, &between);
             (before, after) = (after, before);
         }
-        let binds = [
-            ("before", Bind::Buffer(before)),
-            ("contact", Bind::Buffer(b.contact)),
-            ("todo", Bind::Buffer(b.todo)),
-            ("chosen", Bind::Buffer(b.chosen)),
-            ("solid", Bind::Buffer(b.solid)),
-            ("valued", Bind::Buffer(b.valued)),
-            ("changed", Bind::Buffer(&b.past.list.buffer)),
-        ];
+        let binds = kernel::ChooseBindings {
+            before,
+            contact: b.contact,
+            todo: b.todo,
+            chosen: b.chosen,
+            solid: b.solid,
+            valued: b.valued,
+            changed: &b.past.list.buffer,
+        };
         rec.dispatch(&self.choose, &binds, bytemuck::bytes_of(&params), groups)?;
         rec.barrier(
             &between,

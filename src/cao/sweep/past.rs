@@ -7,19 +7,9 @@
 
 use crate::field::Field;
 use crate::field::bricks::BrickList;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    pad: u32,
-}
-layout_check!(Params => shaders::past::PAST_PARAMS { dims });
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
+use cao_kernels::past as kernel;
 
 /// One brick in so many can change before all values within reach are computed anew: there, walking the rays that meet them
 /// twice is no cheaper, and this much memory, an eighth of a byte a voxel, is enough.
@@ -31,7 +21,7 @@ const LEAST: u32 = 64;
 pub struct PastBricks {
     /// The changed bricks; their number counts on beyond `capacity`.
     pub list: BrickList,
-    /// Former V_o of the listed bricks in 65535ths, 256 u32 each: the voxels of slices z and z + 4 in one.
+    /// Former V_o of the listed bricks in 65535ths, [`kernel::PAST_WORDS`] u32 each: two voxels in one.
     pub opacities: Buffer,
     /// Most bricks kept.
     pub capacity: u32,
@@ -41,9 +31,10 @@ impl PastBricks {
     /// Memory for a sixteenth of a field's bricks, or the few of a small one.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
         let capacity = (field.brick_count() / SHARE).max(LEAST);
+        let brick = u64::from(kernel::PAST_WORDS) * size_of::<u32>() as u64;
         Ok(Self {
             list: BrickList::with_room(gpu, capacity)?,
-            opacities: gpu.buffer("past opacities", 1024 * u64::from(capacity), BufferUse::Device)?,
+            opacities: gpu.buffer("past opacities", brick * u64::from(capacity), BufferUse::Device)?,
             capacity,
         })
     }
@@ -57,7 +48,7 @@ pub struct Past {
 impl Past {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::past::SHADER, "main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Exchanges them, and makes them visible to compute shaders.
@@ -68,12 +59,8 @@ impl Past {
         past: &PastBricks,
         opacity: &Image,
     ) -> Result<()> {
-        let binds = [
-            ("changed", Bind::Buffer(&past.list.buffer)),
-            ("past", Bind::Buffer(&past.opacities)),
-            ("opacity", Bind::Image(opacity)),
-        ];
-        let params = Params { dims: field.dims, pad: 0 };
+        let binds = kernel::MainBindings { changed: &past.list.buffer, past: &past.opacities, opacity };
+        let params = kernel::PastParams { dims: field.dims, pad: Default::default() };
         rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), &past.list.buffer, 0)?;
         let all = [Access::StorageRead, Access::StorageWrite];
         rec.barrier(&all, &all);

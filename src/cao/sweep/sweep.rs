@@ -14,44 +14,15 @@
 //!
 //! Variants that were tried, and where the time goes: `benches/runs/2026-11-24-llvmpipe-sweep/`.
 
-use crate::field::Field;
-use bytemuck::{Pod, Zeroable};
+use crate::field::{BRICK, Field};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Bind, Buffer, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
+use cao_gpu::{Gpu, Pipeline, Recorder};
+use cao_kernels::sweep as kernel;
 use cao_model::lattice::{LatticeRay, LatticeRays};
 use cao_model::occlusion::{Occlusion, Quadrature};
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    axis: u32,
-    step: [i32; 3],
-    window: u32,
-    bricks: [u32; 3],
-    flags: u32,
-    tiles: [u32; 2],
-    list: u32,
-    pieces: u32,
-    depth: f32,
-    start: f32,
-    far: f32,
-    share: f32,
-    advance: [i32; 3],
-    part: i32,
-}
-layout_check!(Params => shaders::sweep::SWEEP_PARAMS {
-    dims, axis, step, window, bricks, flags, tiles, list, pieces, depth, start, far, share, advance, part
-});
-
-/// Longest window of the kernel, in segments.
-const MOST_SEGMENTS: u32 = 128;
-/// Lines of a tile along the two axes across a walk, as the kernels have them.
-const TILE: [u32; 2] = [8, 4];
-/// Segments of a chunk, as the kernels have it.
-const CHUNK: u32 = 8;
+/// Segments of a chunk.
+const CHUNK: u32 = kernel::CHUNK as u32;
 
 /// One direction and its reverse as the kernels walk them.
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +41,7 @@ pub struct Walk {
     pub pieces: u32,
     /// Length of a segment in mm.
     pub length_mm: f64,
-    /// Tiles of 8x4 lines across the walk.
+    /// Tiles of lines across the walk.
     pub tiles: [u32; 2],
     /// Most runs that the list can hold for it.
     pub runs: u32,
@@ -134,11 +105,11 @@ impl SweepPlan {
                 });
             }
             let segments = ray.segments(spacing, radius_mm);
-            if segments - 1 > MOST_SEGMENTS {
+            if segments - 1 > kernel::MOST {
                 return Err(cao_model::Error::Limit {
                     what: format!("segments of a ray along {:?} for radius {radius_mm} mm", ray.step),
                     needed: segments.into(),
-                    limit: u64::from(MOST_SEGMENTS) + 1,
+                    limit: u64::from(kernel::MOST) + 1,
                     hint: "make the radius smaller, or use method lao or cao".into(),
                 });
             }
@@ -153,7 +124,7 @@ impl SweepPlan {
                 .unwrap_or(2);
             let window = (segments - 1).max(1);
             let across: [usize; 2] = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
-            let tiles = [0, 1].map(|i| dims[across[i]].div_ceil(TILE[i]));
+            let tiles = [0, 1].map(|i| dims[across[i]].div_ceil(kernel::TILE[i]));
             let stride = ray.step[axis].unsigned_abs();
             // A run is a chunk with a voxel and `lag` more; between two runs is one at least.
             let size = window.min(CHUNK);
@@ -165,20 +136,8 @@ impl SweepPlan {
     }
 }
 
-/// What the kernel reads and writes.
-#[derive(Clone, Copy)]
-pub struct Bindings<'a> {
-    /// V_o.
-    pub opacity: &'a Image,
-    /// Runs of lines.
-    pub list: &'a Buffer,
-    /// What is to be done in each brick.
-    pub todo: &'a Buffer,
-    /// Where there is opacity.
-    pub solid: &'a Buffer,
-    /// V_AO.
-    pub ambient: &'a Image,
-}
+/// What the kernel reads and writes, whichever of its entry points runs.
+pub use kernel::MainBindings as Bindings;
 
 /// What a sweep does with its rays' contributions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,9 +154,10 @@ impl Pass {
     /// As the kernel has them; `first`: the direction begins the sum.
     fn flags(self, first: bool) -> u32 {
         match self {
-            Self::Anew => u32::from(first),
-            Self::Amend => 2,
-            Self::TakeBack => 2 | 4,
+            Self::Anew if first => kernel::FIRST,
+            Self::Anew => 0,
+            Self::Amend => kernel::AMEND,
+            Self::TakeBack => kernel::AMEND | kernel::ADD,
         }
     }
 }
@@ -212,7 +172,7 @@ pub struct Sweep {
 impl Sweep {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let build = |entry| gpu.compute(&shaders::sweep::SHADER, entry);
+        let build = |entry| gpu.compute(&kernel::SHADER, entry);
         Ok(Self { pipeline: build("main")?, short: build("short")?, pieces: build("pieces")? })
     }
 
@@ -230,7 +190,7 @@ impl Sweep {
     ) -> Result<()> {
         let walk = &plan.walks[index];
         let start = plan.offset_mm / walk.length_mm;
-        let params = Params {
+        let params = kernel::SweepParams {
             dims: field.dims,
             axis: walk.axis as u32,
             step: walk.ray.step,
@@ -244,16 +204,9 @@ impl Sweep {
             start: start as f32,
             far: (walk.segments - 1) as f32,
             advance: [0, 1, 2].map(|i| walk.ray.step[i] % field.dims[i] as i32),
-            part: 8 / walk.ray.step.map(i32::abs).into_iter().max().unwrap_or(1),
+            part: BRICK as i32 / walk.ray.step.map(i32::abs).into_iter().max().unwrap_or(1),
             share: (f64::from(walk.parts) / (f64::from(walk.segments) - start)) as f32,
         };
-        let binds = [
-            ("opacity", Bind::Image(b.opacity)),
-            ("list", Bind::Buffer(b.list)),
-            ("todo", Bind::Buffer(b.todo)),
-            ("solid", Bind::Buffer(b.solid)),
-            ("ambient", Bind::Image(b.ambient)),
-        ];
         let at = crate::sweep::sweep_list::HEAD_BYTES * index as u64;
         // By the plan alone, so that full and partial updates run the same code.
         let pipeline = match walk.pieces {
@@ -261,6 +214,6 @@ impl Sweep {
             _ if walk.window < CHUNK => &self.short,
             _ => &self.pipeline,
         };
-        rec.dispatch_indirect(pipeline, &binds, bytemuck::bytes_of(&params), b.list, at)
+        rec.dispatch_indirect(pipeline, &b, bytemuck::bytes_of(&params), b.list, at)
     }
 }

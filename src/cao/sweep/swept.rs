@@ -17,7 +17,7 @@ use super::past::{Past, PastBricks};
 use super::sweep::{self, Pass, Sweep, SweepPlan};
 use super::sweep_list::{self, SweepList, SweepLists};
 use crate::Result;
-use crate::clip::classify::Classify;
+use crate::clip::classify::{AFFECTED, Classify, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
 use crate::drive::{self, Part};
 use crate::field::bricks::BrickList;
@@ -336,7 +336,8 @@ impl Ambient for Swept {
         for k in 0..z {
             for j in 0..y {
                 let row = (k / BRICK * by + j / BRICK) * bx;
-                mask.extend((0..x).map(|i| 2 - (todo[(row + i / BRICK) as usize] & TODO) as u8));
+                let done = |i: u32| todo[(row + i / BRICK) as usize] & TODO != 0;
+                mask.extend((0..x).map(|i| if done(i) { AFFECTED as u8 } else { UNTOUCHED as u8 }));
             }
         }
         Ok(mask)

@@ -4,34 +4,10 @@
 
 use crate::field::Field;
 use crate::field::bricks::BrickList;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{
-    Access, Bind, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline,
-};
-use cao_kernels as shaders;
+use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline};
+use cao_kernels::compare as kernel;
 use cao_model::settings::Scope;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    only_needed: u32,
-    bricks: [u32; 3],
-    by_brick: u32,
-}
-layout_check!(Params => shaders::compare::COMPARE_PARAMS { dims, only_needed, bricks, by_brick });
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Counters {
-    compared: u32,
-    different: u32,
-    largest: u32,
-    recomputed: u32,
-}
-layout_check!(Counters => shaders::compare::DIFFERENCE { compared, different, largest, recomputed });
 
 /// Outcome of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +27,7 @@ pub struct Difference {
 pub enum Recomputed<'a> {
     /// V_m; clipped voxels that touch no visible one have no value.
     Mask(&'a Image),
-    /// A u32 a brick, 1 where it was.
+    /// A u32 a brick, [`TODO`](cao_kernels::compare::TODO) where they were.
     Bricks(&'a Buffer),
 }
 
@@ -63,7 +39,7 @@ pub struct Compare {
 impl Compare {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::compare::SHADER, "main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Compares two ambient volumes on the bricks of the list that the full computation worked on. Uses the device's queue and waits for it.
@@ -79,13 +55,13 @@ impl Compare {
         expected: &Image,
         actual: &Image,
     ) -> Result<Difference> {
-        let bytes = size_of::<Counters>() as u64;
+        let bytes = size_of::<kernel::Difference>() as u64;
         let difference = gpu.buffer("difference", bytes, BufferUse::Device)?;
         let read_back = gpu.buffer("difference read-back", bytes, BufferUse::Readback)?;
         let mut rec = gpu.recorder("compare")?;
         rec.fill(&difference, 0, bytes, 0)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-        let params = Params {
+        let params = kernel::CompareParams {
             dims: field.dims,
             only_needed: u32::from(scope == Scope::Needed),
             bricks: field.bricks(),
@@ -107,21 +83,21 @@ impl Compare {
             Recomputed::Mask(mask) => (mask, &list.buffer),
             Recomputed::Bricks(todo) => (&no_mask, todo),
         };
-        let binds = [
-            ("opacity", Bind::Image(opacity)),
-            ("mask", Bind::Image(mask)),
-            ("expected", Bind::Image(expected)),
-            ("actual", Bind::Image(actual)),
-            ("list", Bind::Buffer(&list.buffer)),
-            ("difference", Bind::Buffer(&difference)),
-            ("todo", Bind::Buffer(todo)),
-        ];
+        let binds = kernel::MainBindings {
+            opacity,
+            mask,
+            expected,
+            actual,
+            list: &list.buffer,
+            difference: &difference,
+            todo,
+        };
         rec.dispatch_indirect(&self.pipeline, &binds, bytemuck::bytes_of(&params), &list.buffer, 0)?;
         rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(&difference, 0, &read_back, 0, bytes)?;
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
-        let c: Counters = bytemuck::pod_read_unaligned(&read_back.read(0, bytes)?);
+        let c: kernel::Difference = bytemuck::pod_read_unaligned(&read_back.read(0, bytes)?);
         Ok(Difference {
             compared: c.compared.into(),
             different: c.different.into(),

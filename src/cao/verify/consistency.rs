@@ -6,31 +6,14 @@
 use crate::draw::eyes::FrameBuffer;
 use crate::host::device_buffer;
 use crate::renderer::Renderer;
-use bytemuck::{Pod, Zeroable};
 use cao_gpu::Result;
-use cao_gpu::layout_check;
-use cao_gpu::{Access, Bind, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
-use cao_kernels as shaders;
+use cao_gpu::{Access, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
+use cao_kernels::consistency as kernel;
 use cao_model::look::Look;
 use cao_model::view::View;
 use glam::Vec3;
 
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    count: u32,
-}
-layout_check!(Params => shaders::consistency::CONSISTENCY_PARAMS { count });
-
-/// What one eye reads at one point.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Seen {
-    /// Transmittance between the eye and the point's voxel, 0 … 1; −1 where the point is outside the eye's image.
-    pub transmittance: f32,
-    /// Ambient factor at the point.
-    pub ambient: f32,
-}
+pub use kernel::Seen;
 
 /// The kernel `consistency`.
 pub struct Consistency {
@@ -43,7 +26,7 @@ impl Consistency {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
-            pipeline: gpu.compute(&shaders::consistency::SHADER, "main")?,
+            pipeline: gpu.compute(&kernel::SHADER, "main")?,
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
         })
@@ -67,16 +50,16 @@ impl Consistency {
         let seen = gpu.buffer("seen", bytes, BufferUse::Device)?;
         let read_back = gpu.buffer("seen read-back", bytes, BufferUse::Readback)?;
         let mut rec = gpu.recorder("consistency")?;
-        let params = Params { count: points.len() as u32 };
-        let binds = [
-            ("opacity", Bind::Image(opacity)),
-            ("ambient", Bind::Image(ambient)),
-            ("field", Bind::Sampler(&self.field)),
-            ("edge", Bind::Sampler(&self.edge)),
-            ("frame", Bind::Buffer(&frame.buffer)),
-            ("points", Bind::Buffer(&points_buffer)),
-            ("seen", Bind::Buffer(&seen)),
-        ];
+        let params = kernel::ConsistencyParams { count: points.len() as u32 };
+        let binds = kernel::MainBindings {
+            opacity,
+            ambient,
+            field: &self.field,
+            edge: &self.edge,
+            frame: &frame.buffer,
+            points: &points_buffer,
+            seen: &seen,
+        };
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), [params.count, 1, 1])?;
         rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         rec.copy_buffer(&seen, 0, &read_back, 0, bytes)?;

@@ -5,36 +5,14 @@
 //! Out: an f32 a point. Cost: 8 texel reads for each direction and step in or near opacity; steps through what is clear are skipped.
 
 use crate::{Error, Result};
-use bytemuck::{Pod, Zeroable};
 use cao::field::Field;
 use cao::host::{device_buffer, row_of_groups};
-use cao_gpu::layout_check;
 use cao_gpu::{
-    Access, Bind, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse,
-    Pipeline, Recorder, Sampler, SamplerDesc,
+    Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline,
+    Recorder, Sampler, SamplerDesc,
 };
-use cao_kernels as shaders;
-use cao_model::occlusion::{Integral, fibonacci};
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    dims: [u32; 3],
-    samples: u32,
-    per_mm: [f32; 3],
-    directions: u32,
-    first: f32,
-    step: f32,
-    exponent: f32,
-    rule: u32,
-    base: u32,
-    count: u32,
-    filtered: u32,
-    pad: u32,
-}
-layout_check!(Params => shaders::reference::REFERENCE_PARAMS {
-    dims, samples, per_mm, directions, first, step, exponent, rule, base, count, filtered
-});
+use cao_kernels::reference as kernel;
+use cao_model::occlusion::{Integral, Rule, fibonacci};
 
 /// The kernel `reference`.
 pub struct Reference {
@@ -161,7 +139,7 @@ impl Reference {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
-            pipeline: gpu.compute(&shaders::reference::SHADER, "main")?,
+            pipeline: gpu.compute(&kernel::SHADER, "main")?,
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             filtered: gpu.info().kind == DeviceKind::Cpu,
         })
@@ -181,7 +159,7 @@ impl Reference {
         base: u32,
         count: u32,
     ) -> cao_gpu::Result<()> {
-        let params = Params {
+        let params = kernel::ReferenceParams {
             dims: field.dims,
             samples: integral.samples,
             per_mm: field.spacing.map(f32::recip),
@@ -189,20 +167,23 @@ impl Reference {
             first: integral.first_mm as f32,
             step: integral.step_mm as f32,
             exponent: (integral.step_mm / reference_mm) as f32,
-            rule: integral.rule as u32,
+            rule: match integral.rule {
+                Rule::Ambient => kernel::AMBIENT,
+                Rule::Literal => kernel::LITERAL,
+            },
             base,
             count,
             filtered: u32::from(self.filtered),
-            pad: 0,
+            pad: Default::default(),
         };
-        let binds = [
-            ("opacity", Bind::Image(&field.volume)),
-            ("clearance", Bind::Image(clearance)),
-            ("field", Bind::Sampler(&self.field)),
-            ("directions", Bind::Buffer(&points.directions)),
-            ("points", Bind::Buffer(&points.at)),
-            ("found", Bind::Buffer(&points.found)),
-        ];
+        let binds = kernel::MainBindings {
+            opacity: &field.volume,
+            clearance,
+            field: &self.field,
+            directions: &points.directions,
+            points: &points.at,
+            found: &points.found,
+        };
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), row_of_groups(count))
     }
 }

@@ -8,25 +8,9 @@
 //! where nothing is drawn. Cost: K + 5 depth reads a pixel.
 
 use crate::{Error, Result};
-use bytemuck::{Pod, Zeroable};
-use cao_gpu::layout_check;
-use cao_gpu::{Bind, Buffer, Gpu, Image, Pipeline, Recorder};
-use cao_kernels as shaders;
+use cao_gpu::{Buffer, Flat, Gpu, Image, Pipeline, Recorder};
+use cao_kernels::ssao as kernel;
 use cao_model::view::View;
-
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Params {
-    tan: [f32; 4],
-    near: f32,
-    far: f32,
-    radius: f32,
-    bias: f32,
-    size: [u32; 2],
-    samples: u32,
-    pad: u32,
-}
-layout_check!(Params => shaders::ssao::SSAO_PARAMS { tan, near, far, radius, bias, size, samples });
 
 /// The kernel `ssao`.
 pub struct Ssao {
@@ -36,7 +20,7 @@ pub struct Ssao {
 impl Ssao {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&shaders::ssao::SHADER, "main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Shades one eye's image, layer `eye` of `depth` (`D32Float`), seen by `view`. `radius_mm` is R, `samples` K; a surface hides a point only
@@ -59,7 +43,7 @@ impl Ssao {
             let problem = format!("{} bytes; expected 4 for each pixel", occlusion.bytes());
             return Err(Error::refused("image-space occlusion", problem));
         }
-        let params = Params {
+        let params = kernel::SsaoParams {
             tan: [view.tan.left, view.tan.right, view.tan.up, view.tan.down],
             near: view.near_mm,
             far: view.far_mm,
@@ -67,9 +51,9 @@ impl Ssao {
             bias: bias_mm,
             size: [width, height],
             samples,
-            pad: 0,
+            pad: Default::default(),
         };
-        let binds = [("depth", Bind::Layer(depth, eye)), ("occlusion", Bind::Buffer(occlusion))];
+        let binds = kernel::MainBindings { depth: Flat::Layer(depth, eye), occlusion };
         Ok(rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), [width, height, 1])?)
     }
 }

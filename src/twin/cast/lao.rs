@@ -24,6 +24,7 @@ use cao_model::occlusion::{Occlusion, Quadrature};
 /// of eight interpolation weights, 1e-16 here and 6e-8 in a shader, would otherwise decide whether an opaque segment
 /// adds nothing or a twentieth of its length.
 pub const OPAQUE: f64 = 1e-6;
+const _: () = assert!(OPAQUE as f32 == cao_kernels::shared::opaque::OPAQUE);
 
 /// Ambient value of every voxel, 0 = fully occluded … 1 = unobstructed. `opacity` is V_o, per `reference_mm`.
 pub fn lao(grid: &Grid, opacity: &[f32], occlusion: &Occlusion, reference_mm: f64) -> Vec<f64> {

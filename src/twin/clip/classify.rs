@@ -4,19 +4,20 @@
 //! O_AA = C_visible/(N+9) · O_voxel                                                 CAO eq. (5)
 //! ```
 //!
-//! A voxel has nine samples, its centre and corners; only where they disagree it has N more. Category a (0): all
-//! samples clipped; b (1): some sample visible, the neighbourhood changed; c (2): the neighbourhood is as it was.
+//! A voxel has nine samples, its centre and corners; only where they disagree it has N more. Category a: all
+//! samples clipped; b: some sample visible, the neighbourhood changed; c: the neighbourhood is as it was.
 
 use crate::clip::clips::{ClipField, visible};
 use crate::{Grid, each};
+use cao_kernels::shared::categories;
 use glam::Vec3;
 
 /// Category a, clipped.
-pub const CLIPPED: u8 = 0;
+pub const CLIPPED: u8 = categories::CLIPPED as u8;
 /// Category b, its rays may meet something that changed.
-pub const AFFECTED: u8 = 1;
+pub const AFFECTED: u8 = categories::AFFECTED as u8;
 /// Category c, every ray meets what it met before.
-pub const UNTOUCHED: u8 = 2;
+pub const UNTOUCHED: u8 = categories::UNTOUCHED as u8;
 
 /// Sample positions in half voxels from the centre: the centre, the 8 corners, and `more` points of Roberts'
 /// Kronecker sequence, u_k = frac(½ + k·(1/g, 1/g², 1/g³)) with g⁴ = g + 1, position 2u − 1, each followed by its

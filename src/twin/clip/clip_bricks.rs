@@ -1,4 +1,4 @@
-//! What the clips do to each brick of 8³ voxels (method.md §6), by asking every sample of every voxel in it.
+//! What the clips do to each brick (method.md §6), by asking every sample of every voxel in it.
 
 use crate::clip::classify::sample_positions;
 use crate::clip::clips::{ClipField, visible};

@@ -15,10 +15,8 @@ use cao_model::Result;
 use cao_model::clip::{Clip, ClipCamera, Mode, Shape};
 use glam::{DVec3, Vec3};
 
-/// Depth in `front` of a pixel without a surface: behind everything.
-pub const NO_FRONT: f32 = 2.0;
-/// Depth in `back` of a pixel without a surface: before everything.
-pub const NO_BACK: f32 = -1.0;
+/// Depth in `front` of a pixel without a surface, behind everything, and in `back`, before everything.
+pub use cao_kernels::shared::layers::{NO_BACK, NO_FRONT};
 
 /// Depth layers of a mesh in its clip camera.
 #[derive(Clone, Debug, PartialEq)]

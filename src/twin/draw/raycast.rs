@@ -13,6 +13,7 @@
 
 use crate::clip::clips::{ClipField, visible};
 use crate::{Grid, each, trilinear, trilinear_clamped};
+use cao_kernels::raycast as kernel;
 use cao_model::look::Look;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
@@ -24,6 +25,7 @@ pub const TOLERANCE: f64 = 0.5;
 pub const GAIN: f64 = 2.0;
 /// Below this gradient of opacity per mm there is no surface, and the diffuse term is 1.
 pub const FLAT_PER_MM: f64 = 1e-4;
+const _: () = assert!(FLAT_PER_MM as f32 == kernel::FLAT_PER_MM);
 
 /// What is drawn; fields are x fastest.
 #[derive(Clone, Copy)]
@@ -163,10 +165,10 @@ fn srgb_slope(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 } else { 1.055 / 2.4 * linear.min(1.0).powf(1.0 / 2.4 - 1.0) }
 }
 
-/// Where a ray comes out of a clip, between a hidden and a visible sample, to 1/16 of their distance: a cut face is
+/// Where a ray comes out of a clip, between a hidden and a visible sample, by a few halvings of their distance: a cut face is
 /// shaded at one depth.
 fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..4 {
+    for _ in 0..kernel::CUT_HALVINGS {
         let middle = (hidden + shown) / 2.0;
         if shown_at(middle) {
             shown = middle;

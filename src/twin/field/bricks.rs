@@ -1,10 +1,10 @@
-//! Bricks of 8³ voxels, and which of them hold a voxel to compute (method.md §5: unchanged bricks cost nothing).
+//! Bricks of voxels, and which of them hold a voxel to compute (method.md §5: unchanged bricks cost nothing).
 
 use crate::Grid;
 use crate::cast::contextual::computed;
 
 /// Voxels along an edge of a brick.
-pub const EDGE: usize = 8;
+pub const EDGE: usize = cao_kernels::shared::bricks::BRICK as usize;
 
 /// The bricks of a volume, as a grid of their own, x fastest; those at the upper ends may be cut short.
 pub fn bricks(grid: &Grid) -> Grid {

@@ -2,10 +2,12 @@
 
 use crate::Grid;
 use crate::field::bricks::{EDGE, bricks};
+use cao_kernels::shared::parts::PARTS;
+use cao_kernels::shared::todo::OCTANT;
 
 /// Opacity to 1/65535, as the device stores it.
 pub fn stored(opacity: f32) -> u16 {
-    (f64::from(opacity) * 65535.0).round() as u16
+    (f64::from(opacity) * f64::from(PARTS)).round() as u16
 }
 
 /// For each brick of [`bricks`], x fastest, a bit for each of the 27 bricks at `(dx, dy, dz)` from it, its own included:
@@ -34,7 +36,7 @@ pub fn changed(grid: &Grid, before: &[u16], after: &[u16]) -> Vec<u32> {
     let mut changed = vec![0; all.len()];
     for i in (0..grid.len()).filter(|&i| before[i] != after[i]) {
         let voxel = grid.voxel(i);
-        let [x, y, z] = voxel.map(|c| c % EDGE / (EDGE / 2));
+        let [x, y, z] = voxel.map(|c| c % EDGE / OCTANT as usize);
         changed[all.index(voxel.map(|c| c / EDGE))] |= 1 << (x + 2 * y + 4 * z);
     }
     changed

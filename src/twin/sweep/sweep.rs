@@ -12,6 +12,7 @@
 
 use crate::cast::lao::{OPAQUE, mean_extinction, mean_transmittance};
 use crate::{Grid, each, trilinear};
+use cao_kernels::shared::parts::PARTS;
 use cao_model::lattice::LatticeRays;
 use cao_model::occlusion::Occlusion;
 
@@ -62,7 +63,7 @@ fn along(
             sum += transmittance * (far - begin) * mean_transmittance(depth);
             transmittance *= (-depth).exp();
         }
-        ambient -= f64::from(parts) / 65535.0 * (1.0 - sum / (f64::from(segments) - start));
+        ambient -= f64::from(parts) / f64::from(PARTS) * (1.0 - sum / (f64::from(segments) - start));
     }
     ambient
 }

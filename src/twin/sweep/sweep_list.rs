@@ -1,13 +1,14 @@
 //! Which steps of which tiles of lines hold a voxel to compute (method.md §4, sparse sweeps), by asking every voxel.
 //!
 //! A voxel x lies on the line that began at layer r of the walk's axis, r < |v_a|, and is reached after i steps:
-//! x_a = r + i·|v_a| (from the other end where v_a < 0). Across the walk the line began at x − i·v, modulo the volume. Eight by four
-//! lines of a layer are a tile.
+//! x_a = r + i·|v_a| (from the other end where v_a < 0). Across the walk the line began at x − i·v, modulo the volume. Some lines of a layer
+//! are a tile.
 
+use cao_kernels::shared::sweep;
 use std::collections::BTreeSet;
 
 /// Lines of a tile along the two axes across a walk.
-const TILE: [usize; 2] = [8, 4];
+const TILE: [usize; 2] = [sweep::TILE[0] as usize, sweep::TILE[1] as usize];
 
 /// Tiles, the first axis across the walk fastest, then the second, then layers; and in them steps from a line's first voxel on.
 pub fn sweep_list(

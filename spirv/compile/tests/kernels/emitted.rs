@@ -198,22 +198,6 @@ pub mod awkward {
     }
     /// What `clear_words` touches.
     pub type ClearWordsBindings<'a> = ListWordsBindings<'a>;
-    /// Layout of [`Awkward`].
-    pub const AWKWARD: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Awkward", size: 1184, fields: &[("normal", 0, 12), ("weight", 12, 4), ("centre", 16, 12), ("size", 32, 8), ("corner", 48, 12), ("points", 64, 32), ("inner", 96, 32), ("turn", 128, 48), ("view", 176, 64), ("narrow", 240, 16), ("pad", 256, 4), ("in", 260, 4), ("far", 288, 4), ("many", 304, 864)]
-    };
-    /// Layout of [`Counted`].
-    pub const COUNTED: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Counted", size: 48, fields: &[("total", 0, 4), ("parts", 16, 0)]
-    };
-    /// Layout of [`Outer`].
-    pub const OUTER: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Outer", size: 64, fields: &[("inner", 0, 64)]
-    };
-    /// Layout of [`Inner`].
-    pub const INNER: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Inner", size: 32, fields: &[("direction", 0, 12), ("count", 12, 4), ("place", 16, 8)]
-    };
 }
 /// Kernel `picture.wgsl`.
 pub mod picture {
@@ -270,14 +254,6 @@ pub mod picture {
             ]
         }
     }
-    /// Layout of [`Look`].
-    pub const LOOK: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Look", size: 16, fields: &[("tint", 0, 12)]
-    };
-    /// Layout of [`Inner`].
-    pub const INNER: crate::gpu::shader::Layout = crate::gpu::shader::Layout {
-        name: "Inner", size: 32, fields: &[("direction", 0, 12), ("count", 12, 4), ("place", 16, 8)]
-    };
 }
 /// What kernels include.
 pub mod shared {

@@ -1,0 +1,2 @@
+// Directions of the largest ray set.
+const MOST_RAYS = 54u;

@@ -1,0 +1,24 @@
+// What is known of each brick, x fastest.
+
+#include "shared/bricks.wgsl"
+
+// Not 0 where it can show something, whatever the clips hide.
+struct Occupancy {
+    visible: array<u32>,
+}
+
+// Where its opacity lies: bit (dx+1) + 3 (dy+1) + 9 (dz+1) is set if a voxel with opacity touches the neighbour brick at
+// (dx, dy, dz), and bit 13 if any voxel has opacity.
+struct Contact {
+    bits: array<u32>,
+}
+
+// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
+struct Solid {
+    bits: array<u32>,
+}
+
+// What is to be done in it: TODO, ANEW, CHANGED.
+struct Todo {
+    brick: array<u32>,
+}
