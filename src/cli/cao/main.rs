@@ -1,5 +1,7 @@
 //! The program `cao`: files in, pictures and ambient volumes out.
 
+#![forbid(unsafe_code)]
+
 mod args;
 mod budget;
 mod chart;

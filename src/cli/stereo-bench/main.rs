@@ -5,18 +5,20 @@
 //! same path ([`path`]), so that whatever slows the machine down slows all of them. Before each run a few frames are not counted. Times of stages
 //! are GPU timestamps; the time of a frame is wall-clock time.
 
+#![forbid(unsafe_code)]
+
 mod args;
 mod bars;
 mod csv;
 mod frames;
 mod machine;
-mod method;
 mod path;
 mod report;
 mod save;
 mod scale;
 mod statistics;
 mod suite;
+mod way;
 
 use clap::Parser;
 use std::process::ExitCode;
