@@ -2,11 +2,11 @@
 
 use anyhow::{Context, Result};
 use cao_formats::scene::VolumeSource;
+use cao_model::METHODS;
 use cao_model::clip::Shape;
-use cao_model::methods::Method;
+use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
-use cao_model::settings::Scope;
-use cao_model::settings::Setup;
+use cao_model::settings::{Scope, Setup};
 use cao_model::values::Endian;
 use cao_model::volume::Volume;
 use clap::Args;
@@ -25,6 +25,7 @@ pub fn usage(problem: impl Into<String>) -> anyhow::Error {
     Usage(problem.into()).into()
 }
 
+/// Flags of every command.
 #[derive(Args)]
 pub struct Global {
     /// Device to use: its number or part of its name, as `cao devices` lists them [env: CAO_DEVICE]
@@ -63,11 +64,11 @@ pub struct Settings {
     /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
     #[arg(long, value_name = "FILE|PRESET")]
     pub transfer: Option<String>,
-    /// Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: 26; of sweeps 26w]
-    #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s))]
+    /// Ray set.
+    #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s), help = rays_help())]
     pub rays: Option<RaySet>,
-    /// Rule along a ray: left (the paper's sum), cell, segment [default: left; of sweeps segment, their only one]
-    #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s))]
+    /// Rule along a ray.
+    #[arg(long, value_name = "RULE", value_parser = |s: &str| Quadrature::parse(s), help = quadrature_help())]
     pub quadrature: Option<Quadrature>,
     /// Length of the rays in mm [default: 20 times the smallest spacing]
     #[arg(long, value_name = "R", value_parser = length, allow_hyphen_values = true)]
@@ -78,6 +79,38 @@ pub struct Settings {
     /// Distance in mm between their samples, of sweeps at most [default: the smallest spacing; of sweeps 1.75 times that, with 50w and 54 1.45 times]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
+}
+
+fn rays_help() -> String {
+    let defaults = by_method(|entry| entry.rays.name().into());
+    format!(
+        "Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: {defaults}]"
+    )
+}
+
+fn quadrature_help() -> String {
+    let rules =
+        by_method(|entry| entry.quadratures.iter().map(|rule| rule.name()).collect::<Vec<_>>().join(", "));
+    format!("Rule along a ray, left being the paper's sum [default: the method's first; {rules}]")
+}
+
+/// Every method and what it does, for a flag's help.
+pub fn methods_help() -> String {
+    by_method(|entry| entry.what.into())
+}
+
+/// What there is to say of every method, once for those of which it is the same.
+fn by_method(say: impl Fn(&Entry) -> String) -> String {
+    let mut said: Vec<(Vec<&str>, String)> = Vec::new();
+    for entry in METHODS {
+        let text = say(entry);
+        match said.iter_mut().find(|(_, same)| *same == text) {
+            Some((names, _)) => names.push(entry.name),
+            None => said.push((vec![entry.name], text)),
+        }
+    }
+    let clauses = said.iter().map(|(names, text)| format!("{}: {text}", names.join(", ")));
+    clauses.collect::<Vec<_>>().join("; ")
 }
 
 impl Raw {
@@ -134,11 +167,16 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     Ok(setup)
 }
 
+/// Three values with one of these characters between them.
 pub fn three<T: FromStr>(text: &str, separators: &[char]) -> Option<[T; 3]> {
     let parts: Option<Vec<T>> = text.split(separators).map(|part| part.trim().parse().ok()).collect();
     parts?.try_into().ok()
 }
 
+/// Three numbers with commas between them.
+///
+/// # Errors
+/// What is expected instead.
 pub fn triple<T: FromStr>(text: &str) -> Result<[T; 3], String> {
     three(text, &[',']).ok_or_else(|| "expected three numbers, X,Y,Z".into())
 }
@@ -151,23 +189,53 @@ fn endian(text: &str) -> Result<Endian, String> {
     Endian::parse(text).ok_or_else(|| "expected little or big".into())
 }
 
+/// A number that fits.
+///
+/// # Errors
+/// What is expected instead.
 pub fn number(text: &str, expected: impl Display, fits: impl Fn(f32) -> bool) -> Result<f32, String> {
     let number = text.parse().ok().filter(|n: &f32| n.is_finite() && fits(*n));
     number.ok_or_else(|| format!("expected {expected}"))
 }
 
+/// A length in mm that may be 0.
+///
+/// # Errors
+/// What is expected instead.
 pub fn length(text: &str) -> Result<f32, String> {
     number(text, "a length >= 0 mm", |mm| mm >= 0.0)
 }
 
+/// A length in mm above 0.
+///
+/// # Errors
+/// What is expected instead.
 pub fn positive(text: &str) -> Result<f32, String> {
     number(text, "a length > 0 mm", |mm| mm > 0.0)
 }
 
+/// Width and height of an image, as `640x480`.
+///
+/// # Errors
+/// What is expected instead.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     let limit = 1..=cao_formats::scene::MAX_IMAGE;
     match text.split_once('x').map(|(w, h)| (w.parse(), h.parse())) {
         Some((Ok(w), Ok(h))) if limit.contains(&w) && limit.contains(&h) => Ok([w, h]),
         _ => Err(format!("expected WIDTHxHEIGHT, each 1 … {}", cao_formats::scene::MAX_IMAGE)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_reads_the_list_of_methods() {
+        let text = methods_help();
+        assert!(METHODS.iter().all(|e| text.contains(&format!("{}: {}", e.name, e.what))), "{text}");
+        assert!(rays_help().ends_with("[default: lao, cao: 26; sweep: 26w]"), "{}", rays_help());
+        let rules = "lao, cao: left, cell, segment; sweep: segment]";
+        assert!(quadrature_help().ends_with(rules), "{}", quadrature_help());
     }
 }

@@ -1,7 +1,6 @@
 //! What the programs share: flags, what is printed, progress, how they end.
 
 #![forbid(unsafe_code)]
-#![allow(missing_docs, reason = "names of flags and of what is printed say it")]
 
 pub mod args;
 pub mod output;

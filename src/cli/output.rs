@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use cao::method::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::lattice::LatticeRays;
-use cao_model::methods::Method;
+use cao_model::methods::Samples;
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,6 +24,7 @@ pub struct Out {
 }
 
 impl Out {
+    /// Nothing yet, in the form that the user chose.
     pub fn new(global: &Global) -> Self {
         Self { as_json: global.json, text: String::new(), fields: Map::new() }
     }
@@ -72,41 +73,36 @@ impl Out {
         self.occlusion(method, setup, volume);
     }
 
-    /// The rays that these methods cast.
+    /// The rays of these methods.
     pub fn occlusion(&mut self, methods: &str, setup: &Setup, volume: &Volume) {
         let o = setup.occlusion;
-        let spacing = volume.min_spacing();
-        if setup.method == Method::Sweep {
-            let rays = LatticeRays::new(o.rays, volume.spacing);
-            self.line(format!(
-                "method    {methods}, rays {} ({} directions, residual {:.1e}), quadrature segment, radius {} mm, from {} mm on, samples at most {} mm apart",
-                o.rays.name(),
-                rays.rays.len(),
-                rays.residual,
-                o.radius_mm,
-                o.lattice_offset(spacing),
-                o.lattice_step(spacing)
-            ));
-            self.json(json!({
-                "rays": o.rays.name(), "directions": rays.rays.len(), "residual": rays.residual,
-                "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
-                "offset_mm": o.lattice_offset(spacing), "step_mm": o.lattice_step(spacing)
-            }));
-            return;
+        let (rays, quadrature, spacing) = (o.rays.name(), o.quadrature.name(), volume.min_spacing());
+        match setup.method.entry().samples {
+            Samples::Steps => {
+                let (samples, step, first) = (o.samples(spacing), o.step(spacing), o.first(spacing));
+                self.line(format!(
+                    "method    {methods}, rays {rays}, quadrature {quadrature}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
+                    o.radius_mm,
+                ));
+                self.json(json!({
+                    "rays": rays, "quadrature": quadrature, "radius_mm": o.radius_mm,
+                    "samples": samples, "step_mm": step, "first_sample_mm": first
+                }));
+            }
+            Samples::Lattice => {
+                let LatticeRays { rays: directions, residual, .. } = LatticeRays::new(o.rays, volume.spacing);
+                let (count, step, offset) =
+                    (directions.len(), o.lattice_step(spacing), o.lattice_offset(spacing));
+                self.line(format!(
+                    "method    {methods}, rays {rays} ({count} directions, residual {residual:.1e}), quadrature {quadrature}, radius {} mm, from {offset} mm on, samples at most {step} mm apart",
+                    o.radius_mm,
+                ));
+                self.json(json!({
+                    "rays": rays, "directions": count, "residual": residual, "quadrature": quadrature,
+                    "radius_mm": o.radius_mm, "offset_mm": offset, "step_mm": step
+                }));
+            }
         }
-        self.line(format!(
-            "method    {methods}, rays {}, quadrature {}, radius {} mm in {} steps of {} mm, first sample at {} mm",
-            o.rays.name(),
-            o.quadrature.name(),
-            o.radius_mm,
-            o.samples(spacing),
-            o.step(spacing),
-            o.first(spacing)
-        ));
-        self.json(json!({
-            "rays": o.rays.name(), "quadrature": o.quadrature.name(), "radius_mm": o.radius_mm,
-            "samples": o.samples(spacing), "step_mm": o.step(spacing), "first_sample_mm": o.first(spacing)
-        }));
     }
 
     /// Size of the picture.
@@ -159,6 +155,9 @@ impl Out {
     }
 
     /// Prints. A pipe whose reader has left is no failure.
+    ///
+    /// # Errors
+    /// Standard output cannot be written to.
     pub fn finish(self) -> Result<()> {
         let text = if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
         match std::io::stdout().write_all(text.as_bytes()) {
@@ -169,11 +168,17 @@ impl Out {
 }
 
 /// Opens the device that the user chose.
+///
+/// # Errors
+/// There is none, or it lacks something.
 pub fn open_gpu(global: &Global) -> Result<Gpu> {
     Ok(Gpu::open(&OpenOptions { device: global.device.clone(), validation: global.validate })?)
 }
 
 /// Fails when the validation layer said anything.
+///
+/// # Errors
+/// What it said.
 pub fn check_validation(gpu: &Gpu) -> Result<()> {
     Ok(gpu.assert_clean()?)
 }
@@ -215,10 +220,10 @@ pub fn check_targets<'a>(
             return Err(usage(format!("{shown}: would be written twice; expected different names")));
         }
         // Permissions, read-only file systems and quotas are found by trying only.
-        let trial = real_folder.join(format!(".cao-{}.part", std::process::id()));
-        let tried = FileOptions::new().write(true).create_new(true).open(&trial);
+        let attempt = real_folder.join(format!(".cao-{}.part", std::process::id()));
+        let tried = FileOptions::new().write(true).create_new(true).open(&attempt);
         tried.with_context(|| format!("cannot write {shown}"))?;
-        std::fs::remove_file(&trial).with_context(|| format!("cannot write {shown}"))?;
+        std::fs::remove_file(&attempt).with_context(|| format!("cannot write {shown}"))?;
         taken.push(real);
     }
     Ok(())
@@ -231,11 +236,13 @@ pub struct Progress {
     stage: Option<mpsc::Sender<()>>,
 }
 
-impl Progress {
-    pub fn new() -> Self {
+impl Default for Progress {
+    fn default() -> Self {
         Self { bar: ProgressBar::hidden(), stage: None }
     }
+}
 
+impl Progress {
     /// Begins a stage.
     pub fn stage(&mut self, what: &'static str) {
         self.end_stage();

@@ -1,5 +1,6 @@
-//! The two central claims, as a measurement: contextual ambient occlusion equals a full recomputation bit for bit
-//! (CAO §4), and both eyes read the same ambient factor at the same point (CAO §5).
+//! The two central claims, as a measurement: after a clip has moved, the ambient values equal a full recomputation bit for bit
+//! (CAO §4; of [`Method::Cao`](cao_model::methods::Method::Cao): contextual LAO = LAO), and both eyes read the same ambient factor at the
+//! same point (CAO §5).
 
 use super::random::Random;
 use crate::Result;
@@ -25,14 +26,14 @@ pub struct Plan {
 
 /// One clip and what it showed.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub struct Cut {
     /// The clip.
     pub clip: Clip,
-    /// Full against contextual.
+    /// The full recomputation against the update.
     pub difference: Difference,
     /// Voxels of each category.
     pub categories: Categories,
-    /// Stages of the contextual update, classification included, ms.
+    /// Stages of the update after the clip moved, classification included, ms.
     pub contextual: Timings,
     /// Stages of the full recomputation of the same volume, ms.
     pub full: Timings,
@@ -53,26 +54,26 @@ pub struct Stereo {
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Each clip.
-    pub trials: Vec<Trial>,
+    pub cuts: Vec<Cut>,
     /// All views together.
     pub stereo: Stereo,
 }
 
 impl Report {
-    /// All trials together.
+    /// All cuts together.
     pub fn total(&self) -> Difference {
-        self.trials.iter().fold(Difference::default(), |sum, trial| Difference {
-            compared: sum.compared + trial.difference.compared,
-            different: sum.different + trial.difference.different,
-            largest: sum.largest.max(trial.difference.largest),
-            recomputed: sum.recomputed + trial.difference.recomputed,
+        self.cuts.iter().fold(Difference::default(), |sum, cut| Difference {
+            compared: sum.compared + cut.difference.compared,
+            different: sum.different + cut.difference.different,
+            largest: sum.largest.max(cut.difference.largest),
+            recomputed: sum.recomputed + cut.difference.recomputed,
         })
     }
 
-    /// Median over the trials of full time / contextual time.
+    /// Median over the cuts of full time / contextual time.
     pub fn speedup(&self) -> f64 {
         let mut ratios: Vec<f64> =
-            self.trials.iter().map(|t| t.full.total() / t.contextual.total().max(1e-6)).collect();
+            self.cuts.iter().map(|cut| cut.full.total() / cut.contextual.total().max(1e-6)).collect();
         ratios.sort_by(f64::total_cmp);
         ratios.get(ratios.len() / 2).copied().unwrap_or(1.0)
     }
@@ -87,9 +88,11 @@ impl Report {
         !self.vacuous() && self.total().different == 0 && self.stereo.different == 0
     }
 
-    /// Share of all voxels that the clips affected (category b), the paper's measure of the contextual work (CAO §4).
+    /// Share of all voxels that the clips affected (category b), the paper's measure of the contextual work (CAO §4); of methods that do not
+    /// tell voxels apart, in whole bricks.
     pub fn affected(&self) -> f64 {
-        let sum = |of: fn(&Categories) -> u32| self.trials.iter().map(|t| f64::from(of(&t.categories))).sum();
+        let sum =
+            |of: fn(&Categories) -> u32| self.cuts.iter().map(|cut| f64::from(of(&cut.categories))).sum();
         let (affected, other): (f64, f64) = (sum(|c| c.affected), sum(|c| c.clipped) + sum(|c| c.untouched));
         affected / (affected + other).max(1.0)
     }
@@ -104,23 +107,23 @@ const SOLID: f32 = 0.05;
 /// A point counts as seen when at least this much of its light reaches the eye.
 const SEEN: f32 = 0.3;
 
-/// Clips the renderer's volume with every shape at random poses, updates contextually, recomputes in full and compares.
+/// Clips the renderer's volume with every shape at random poses, updates by its method, recomputes in full and compares.
 /// `progress` hears the share done.
 pub fn verify(renderer: &mut Renderer, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Report> {
     let mut random = Random::new(plan.seed);
     let total = (plan.shapes.len() as u32 * plan.poses).max(1);
-    let mut report = Report { trials: Vec::new(), stereo: Stereo::default() };
+    let mut report = Report { cuts: Vec::new(), stereo: Stereo::default() };
     for shape in &plan.shapes {
         for pose in 0..plan.poses {
             let clip = random_clip(&mut random, renderer, shape, pose);
             renderer.set_clips(std::slice::from_ref(&clip))?;
-            let done = f64::from(report.trials.len() as u32);
+            let done = f64::from(report.cuts.len() as u32);
             let contextual = renderer.update(&mut |_| ())?;
             let (difference, full) =
                 cao::verify::verify(renderer, &mut |part| progress((done + part) / f64::from(total)))?;
             // The first update also computes V_PAO, which belongs to neither.
             let contextual = contextual.into_iter().filter(|timing| timing.stage.phase != Phase::Prepare);
-            report.trials.push(Trial {
+            report.cuts.push(Cut {
                 clip,
                 difference,
                 categories: renderer.categories()?,

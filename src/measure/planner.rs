@@ -6,7 +6,7 @@
 //! ```text
 //! rmse² = Σ_b n_b e_b / Σ_b n_b          e_b mean squared error of sample brick b, n_b its voxels that count
 //! bound² = rmse² + 2 √(Σ_b (n_b/n̄)² (e_b − rmse²)² / (B (B − 1)))       two standard errors of that ratio
-//! ms = time of a sample brick among many · bricks that an update computes
+//! ms = time of a sample brick among many · bricks that an update computes; where a brick alone says nothing, of a whole update
 //! ```
 //!
 //! An error budget takes the cheapest candidate whose `bound` it holds, a time budget the most accurate one whose `ms` leaves it
@@ -19,12 +19,14 @@ use crate::{Error, Result};
 use cao::field::BRICK;
 use cao::renderer::Renderer;
 use cao::verify::probe::Probe;
-use cao_gpu::{Gpu, Phase};
-use cao_model::methods::Method;
+use cao_gpu::{Gpu, Phase, Timings};
+use cao_model::METHODS;
+use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::Scope;
-use cao_model::settings::Setup;
+use cao_model::settings::{Scope, Setup};
 use cao_twin::Grid;
+use std::collections::HashMap;
+use std::time::Instant;
 
 /// Bricks that errors and times are measured on.
 pub const SAMPLES: usize = 24;
@@ -54,7 +56,7 @@ pub enum Budget {
 /// Settings to choose from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
-    /// [`Method::Lao`] and [`Method::Cao`] cast the same rays, and count as the same here.
+    /// Methods with the same values count as the same here.
     pub method: Method,
     /// Rays, rule, lengths.
     pub occlusion: Occlusion,
@@ -91,34 +93,48 @@ pub struct Calibration {
     pub needed: Vec<u32>,
 }
 
-/// What may be chosen in place of `setup`, with its lengths: rays cast by the method that it has, by every set and rule, and sweeps,
-/// by the sets with weights (and 6 rays, whose weights are equal anyway); or only this method, these rays, this rule.
+/// What may be chosen in place of `setup`, with its lengths: every method, by the ray sets and rules of its entry, of methods with the
+/// same values the one that it has; or only this method, these rays, this rule.
 pub fn candidates(
     setup: &Setup,
     method: Option<Method>,
     rays: Option<RaySet>,
     quadrature: Option<Quadrature>,
 ) -> Vec<Candidate> {
+    let chosen = |entry: &&Entry| match method {
+        Some(only) => entry.method == only,
+        None => stands_for(entry.same_values_as, setup.method) == entry.method,
+    };
+    let methods: Vec<&Entry> = METHODS.iter().filter(chosen).collect();
     let mut list = Vec::new();
     for set in RaySet::ALL.into_iter().filter(|set| rays.is_none_or(|only| *set == only)) {
         for rule in Quadrature::ALL.into_iter().filter(|rule| quadrature.is_none_or(|only| *rule == only)) {
             let occlusion = Occlusion { rays: set, quadrature: rule, ..setup.occlusion };
-            let cast = method.unwrap_or(if setup.method == Method::Lao { Method::Lao } else { Method::Cao });
-            if cast != Method::Sweep {
-                list.push(Candidate { method: cast, occlusion });
-            }
-            let weighted = matches!(set, RaySet::R6 | RaySet::W14 | RaySet::W26 | RaySet::W50);
-            let swept = method.unwrap_or(Method::Sweep) == Method::Sweep;
-            if swept && rule == Method::Sweep.quadrature() && (weighted || rays.is_some()) {
-                list.push(Candidate { method: Method::Sweep, occlusion });
-            }
+            // Sets that a method does not list are for who asks for them.
+            let tries = |entry: &&&Entry| {
+                entry.quadratures.contains(&rule) && (rays.is_some() || entry.sets.contains(&set))
+            };
+            list.extend(methods.iter().filter(tries).map(|e| Candidate { method: e.method, occlusion }));
         }
     }
     list
 }
 
-/// Tries candidates, the cheaper ones first where they stand first, on sample bricks of the scene as it is; sweeps are timed as a
-/// whole, since a brick swept alone costs more than among its neighbours. Where a budget is given, candidates that cannot be its
+/// Of the methods with these values the one in use, or else the last of the list.
+fn stands_for(values: Method, in_use: Method) -> Method {
+    if in_use.values() == values {
+        return in_use;
+    }
+    METHODS.iter().rfind(|entry| entry.same_values_as == values).map_or(values, |entry| entry.method)
+}
+
+/// Whether a candidate's values are those of rays that can be cast in a few bricks by themselves, as [`Probe`] does.
+fn probed(candidate: &Candidate) -> bool {
+    candidate.method.values() == Method::Lao
+}
+
+/// Tries candidates, the cheaper ones first where they stand first, on sample bricks of the scene as it is; methods that do not cast
+/// rays voxel by voxel are computed and timed as a whole, since a brick alone costs them more than among its neighbours. Where a budget is given, candidates that cannot be its
 /// choice, by the time that fewer rays took, are left out. The renderer's ambient volume is out of date afterwards and its setup may be
 /// another. `progress` hears the share done (0 … 1). Uses the device's queue and waits for it.
 ///
@@ -132,11 +148,11 @@ pub fn calibrate(
 ) -> Result<Calibration> {
     let all = renderer.field().brick_count();
     let scope = renderer.setup().scope;
-    let scene = Scene::new(renderer)?;
-    let needed = scene.needed();
+    let probed = Probed::new(renderer)?;
+    let needed = probed.needed();
     let bricks = sample(&needed);
-    let samples = scene.samples(&bricks, candidates, &mut |part| progress(0.4 * part))?;
-    drop(scene);
+    let samples = probed.samples(&bricks, candidates, &mut |part| progress(0.4 * part))?;
+    drop(probed);
     let (timed, computed) = match scope {
         Scope::Needed => (bricks.clone(), needed.len()),
         Scope::All => (sample(&(0..all).collect::<Vec<_>>()), all as usize),
@@ -148,7 +164,7 @@ pub fn calibrate(
 
 /// Errors of candidates on bricks of one's own choice; `ms` of cast rays is the time of one of these bricks.
 pub fn measure(renderer: &mut Renderer, candidates: &[Candidate], bricks: &[u32]) -> Result<Vec<Measured>> {
-    let samples = Scene::new(renderer)?.samples(bricks, candidates, &mut |_| ())?;
+    let samples = Probed::new(renderer)?.samples(bricks, candidates, &mut |_| ())?;
     try_all(renderer, candidates, bricks, &samples, (bricks, 1), None, &mut |_| ())
 }
 
@@ -161,8 +177,8 @@ struct Tried {
     budget: Option<Budget>,
     /// No choice takes longer, in ms.
     limit: f64,
-    /// Least time in ms that a ray took, of cast rays and of sweeps.
-    ray_ms: [f64; 2],
+    /// Least time in ms that a ray took, by the method whose values they are.
+    ray_ms: HashMap<Method, f64>,
     measured: Vec<Measured>,
 }
 
@@ -172,12 +188,12 @@ impl Tried {
     }
 
     fn hopeless(&self, candidate: &Candidate) -> bool {
-        let ray_ms = self.ray_ms[usize::from(candidate.method == Method::Sweep)];
-        ray_ms.is_finite() && ray_ms * Self::rays(candidate) > HOPELESS * self.limit
+        let ray_ms = self.ray_ms.get(&candidate.method.values());
+        ray_ms.is_some_and(|ms| ms * Self::rays(candidate) > HOPELESS * self.limit)
     }
 
     fn add(&mut self, measured: Measured) {
-        let ray_ms = &mut self.ray_ms[usize::from(measured.candidate.method == Method::Sweep)];
+        let ray_ms = self.ray_ms.entry(measured.candidate.method.values()).or_insert(f64::INFINITY);
         *ray_ms = ray_ms.min(measured.ms / Self::rays(&measured.candidate));
         if let Some(budget @ Budget::Error(_)) = self.budget
             && budget.holds(&measured)
@@ -188,7 +204,7 @@ impl Tried {
     }
 }
 
-/// Sweeps first, which are the cheaper ones: they spare the most. `timed` are the bricks that cast rays are timed on, and the
+/// Methods computed as a whole first, which are the cheaper ones: they spare the most. `timed` are the bricks that cast rays are timed on, and the
 /// number of bricks that they stand for.
 fn try_all(
     renderer: &mut Renderer,
@@ -204,16 +220,15 @@ fn try_all(
         Some(Budget::Milliseconds(most)) => most / TIME_MARGIN,
         _ => f64::INFINITY,
     };
-    let mut tried = Tried { budget, limit, ray_ms: [f64::INFINITY; 2], measured: Vec::new() };
-    let (sweeps, casts): (Vec<Candidate>, Vec<Candidate>) =
-        candidates.iter().partition(|candidate| candidate.method == Method::Sweep);
+    let mut tried = Tried { budget, limit, ray_ms: HashMap::new(), measured: Vec::new() };
+    let (casts, wholes): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|c| probed(c));
     let part = |done: usize| done as f64 / candidates.len() as f64;
-    for (i, &candidate) in sweeps.iter().enumerate() {
+    for (i, &candidate) in wholes.iter().enumerate() {
         let Candidate { method, occlusion } = candidate;
         if !tried.hopeless(&candidate) {
             match renderer.set_setup(Setup { method, occlusion, ..setup }) {
                 Ok(()) => {
-                    let (values, ms) = swept(renderer)?;
+                    let (values, ms) = whole(renderer)?;
                     let (rmse, bound) = judge(samples, |_, voxel| values[voxel]);
                     tried.add(Measured { candidate, rmse, bound, ms });
                 }
@@ -225,25 +240,26 @@ fn try_all(
         progress(part(i + 1));
     }
     if !casts.is_empty() {
-        let scene = Scene::new(renderer)?;
+        let probed = Probed::new(renderer)?;
         for (i, &candidate) in casts.iter().enumerate() {
             if !tried.hopeless(&candidate) {
-                let (rmse, bound, brick_ms) = scene.cast(&candidate.occlusion, bricks, samples, timed.0)?;
+                let (rmse, bound, brick_ms) = probed.cast(&candidate.occlusion, bricks, samples, timed.0)?;
                 tried.add(Measured { candidate, rmse, bound, ms: brick_ms * timed.1 as f64 });
             }
-            progress(part(sweeps.len() + i + 1));
+            progress(part(wholes.len() + i + 1));
         }
     }
     Ok(tried.measured)
 }
 
-/// Ambient factors of everything by the renderer's sweep, and the median time in ms of the sweep.
-fn swept(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
+/// Ambient factors of everything by the renderer's method, and the median time in ms of computing them.
+fn whole(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
     let mut times = Vec::new();
     for _ in 0..3 {
         renderer.invalidate();
+        let start = Instant::now();
         let timings = renderer.update(&mut |_| ())?;
-        times.push(timings.of(Phase::Ambient));
+        times.push(ambient_ms(&timings, start.elapsed().as_secs_f64() * 1e3));
         if times[0] > LONG_ENOUGH_MS {
             break;
         }
@@ -252,8 +268,15 @@ fn swept(renderer: &mut Renderer) -> Result<(Vec<f32>, f64)> {
     Ok((renderer.read_ambient()?, times[times.len() / 2]))
 }
 
-/// A sweep of this many ms is not timed again.
+/// An update of this many ms is not timed again.
 const LONG_ENOUGH_MS: f64 = 20.0;
+
+/// Time in ms of computing ambient factors in an update that computed all of them. That takes time: where no stage says so, because the
+/// device's queue has no timestamps or a stage is not where it belongs, all of the update's `by_clock` counts.
+fn ambient_ms(update: &Timings, by_clock: f64) -> f64 {
+    let ms = update.of(Phase::Ambient);
+    if ms > 0.0 { ms } else { by_clock }
+}
 
 impl Calibration {
     /// The candidate to take.
@@ -332,21 +355,21 @@ fn sample(bricks: &[u32]) -> Vec<u32> {
     (0..SAMPLES).map(|i| bricks[run(i) + random.below((run(i + 1) - run(i)) as u64) as usize]).collect()
 }
 
-/// The scene as trials see it.
-struct Scene<'a> {
+/// The scene as probes see it.
+struct Probed<'a> {
     gpu: Gpu,
     grid: Grid,
     opacity: Vec<f32>,
-    trial: Probe<'a>,
+    probe: Probe<'a>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> Probed<'a> {
     fn new(renderer: &'a mut Renderer) -> Result<Self> {
         let gpu = renderer.gpu().clone();
         let field = renderer.field();
         let grid = Grid { dims: field.dims.map(|d| d as usize), spacing: field.spacing.map(f64::from) };
-        let (trial, opacity) = cao::verify::probe(renderer)?;
-        Ok(Self { gpu, grid, opacity, trial })
+        let (probe, opacity) = cao::verify::probe(renderer)?;
+        Ok(Self { gpu, grid, opacity, probe })
     }
 
     /// Whether a sample with opacity can interpolate a voxel.
@@ -379,7 +402,7 @@ impl<'a> Scene<'a> {
 
     /// Voxels of a brick that count, as indices in the volume.
     fn counting(&self, brick: u32) -> Vec<usize> {
-        let (first, size) = self.trial.brick(brick);
+        let (first, size) = self.probe.brick(brick);
         let place = |i: u32| {
             let inside = [i % size[0], i / size[0] % size[1], i / (size[0] * size[1])];
             self.grid.index(std::array::from_fn(|a| (first[a] + inside[a]) as usize))
@@ -413,7 +436,7 @@ impl<'a> Scene<'a> {
             &compared,
             f64::from(like.radius_mm),
             offset,
-            self.trial.reference_mm().into(),
+            self.probe.reference_mm().into(),
             &REFERENCE,
             progress,
         )?;
@@ -431,12 +454,12 @@ impl<'a> Scene<'a> {
         samples: &[Sample],
         timed: &[u32],
     ) -> Result<(f64, f64, f64)> {
-        let (values, mut ms) = self.trial.run(occlusion, bricks)?;
+        let (values, mut ms) = self.probe.run(occlusion, bricks)?;
         if timed != bricks {
-            ms = self.trial.run(occlusion, timed)?.1;
+            ms = self.probe.run(occlusion, timed)?.1;
         }
         let (rmse, bound) = judge(samples, |b, voxel| {
-            let (first, size) = self.trial.brick(bricks[b]);
+            let (first, size) = self.probe.brick(bricks[b]);
             let at = self.grid.voxel(voxel);
             let [x, y, z]: [usize; 3] = std::array::from_fn(|a| at[a] - first[a] as usize);
             values[b][(z * size[1] as usize + y) * size[0] as usize + x]
@@ -481,6 +504,8 @@ fn spread(bricks: &[(f64, f64)]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cao::stages;
+    use cao_gpu::Stage;
 
     fn calibration(list: &[(f64, f64)]) -> Calibration {
         let candidate = Candidate { method: Method::Lao, occlusion: Occlusion::paper(1.0) };
@@ -551,7 +576,7 @@ mod tests {
         let new = |budget, limit| Tried {
             budget: Some(budget),
             limit,
-            ray_ms: [f64::INFINITY; 2],
+            ray_ms: HashMap::new(),
             measured: Vec::new(),
         };
         let sets = RaySet::ALL;
@@ -573,7 +598,7 @@ mod tests {
 
     #[test]
     fn flags_limit_the_candidates() {
-        let mut setup = Setup::of(cao_model::methods::Method::Cao, 1.0);
+        let mut setup = Setup::of(Method::Cao, 1.0);
         setup.occlusion.radius_mm = 7.0;
         let count = |list: &[Candidate], method| list.iter().filter(|c| c.method == method).count();
         let all = candidates(&setup, None, None, None);
@@ -588,8 +613,27 @@ mod tests {
         assert_eq!((count(&some, Method::Cao), count(&some, Method::Sweep)), (3, 1));
         let some = candidates(&setup, Some(Method::Lao), None, Some(Quadrature::Segment));
         assert!(some.len() == 7 && some.iter().all(|c| c.occlusion.quadrature == Quadrature::Segment));
-        // Sweeps have one rule.
+        // Not every method has every rule; sets that a method does not list are tried where they are asked for.
+        let some = candidates(&setup, None, Some(RaySet::R54), Some(Quadrature::Segment));
+        assert_eq!((some.len(), count(&some, Method::Sweep)), (2, 1));
         assert_eq!(candidates(&setup, None, None, Some(Quadrature::Left)).len(), 7);
         assert_eq!(candidates(&setup, Some(Method::Sweep), None, Some(Quadrature::Left)), []);
+    }
+
+    /// What belongs to a phase is told by the phase, never by a name; and what is in none is not taken for nothing.
+    #[test]
+    fn a_renamed_stage_can_no_longer_make_the_planner_believe_in_0_ms() {
+        let update = |stages: &[(Stage, f64)]| {
+            let mut timings = Timings::new();
+            stages.iter().for_each(|&(stage, ms)| timings.push(stage, ms));
+            ambient_ms(&timings, 9.0)
+        };
+        let renamed = Stage { name: "another name", ..stages::SWEEP };
+        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::CHOOSE, 0.5), (stages::SWEEP, 4.0)]), 4.5);
+        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::CHOOSE, 0.5), (renamed, 4.0)]), 4.5);
+        let lost = Stage { phase: Phase::Prepare, ..stages::SWEEP };
+        assert_eq!(update(&[(stages::CARVE, 1.0), (lost, 4.0)]), 9.0);
+        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::SWEEP, 0.0)]), 9.0);
+        assert_eq!(update(&[]), 9.0, "a queue without timestamps");
     }
 }

@@ -32,6 +32,26 @@ pub struct Entry {
     pub rays: RaySet,
     /// The rules that it can integrate rays by; the first unless another is asked for.
     pub quadratures: &'static [Quadrature],
+    /// The ray sets that charts and the planner try, in the order of their cost; others are for who asks for them.
+    pub sets: &'static [RaySet],
+    /// Where its samples lie along a ray.
+    pub samples: Samples,
+    /// Whether an update computes only what a change affects; else everything.
+    pub contextual: bool,
+    /// The method whose values it has, bit for bit; itself where no other has them.
+    pub same_values_as: Method,
+}
+
+/// Where samples lie along a ray (method.md §3, §4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
+    /// In equal steps from the voxel on: [`Occlusion::first`](crate::occlusion::Occlusion::first),
+    /// [`Occlusion::step`](crate::occlusion::Occlusion::step).
+    Steps,
+    /// In equal parts of each segment between the lattice's points: at most
+    /// [`Occlusion::lattice_step`](crate::occlusion::Occlusion::lattice_step) apart, from
+    /// [`Occlusion::lattice_offset`](crate::occlusion::Occlusion::lattice_offset) on.
+    Lattice,
 }
 
 /// Every method, the one to use first last.
@@ -43,7 +63,11 @@ pub static METHODS: &[Entry] = &[
         what: "all rays of every voxel, at every change",
         source: "CAO §3.4, eq. (2), (3)",
         rays: RaySet::R26,
-        quadratures: &[Quadrature::Left, Quadrature::Cell, Quadrature::Segment],
+        quadratures: &Quadrature::ALL,
+        sets: &RaySet::ALL,
+        samples: Samples::Steps,
+        contextual: false,
+        same_values_as: Method::Lao,
     },
     Entry {
         method: Method::Cao,
@@ -52,7 +76,11 @@ pub static METHODS: &[Entry] = &[
         what: "all rays of the voxels that a clip affects",
         source: "CAO §3.5",
         rays: RaySet::R26,
-        quadratures: &[Quadrature::Left, Quadrature::Cell, Quadrature::Segment],
+        quadratures: &Quadrature::ALL,
+        sets: &RaySet::ALL,
+        samples: Samples::Steps,
+        contextual: true,
+        same_values_as: Method::Lao,
     },
     Entry {
         method: Method::Sweep,
@@ -63,6 +91,11 @@ pub static METHODS: &[Entry] = &[
         // Those that cost it least for their accuracy.
         rays: RaySet::W26,
         quadratures: &[Quadrature::Segment],
+        // Those with weights, and 6, whose weights are equal anyway.
+        sets: &[RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50],
+        samples: Samples::Lattice,
+        contextual: true,
+        same_values_as: Method::Sweep,
     },
 ];
 
@@ -108,9 +141,19 @@ impl Method {
         self.entry().quadratures[0]
     }
 
+    /// Whether it can integrate rays by this rule.
+    pub fn has(self, rule: Quadrature) -> bool {
+        self.entry().quadratures.contains(&rule)
+    }
+
+    /// The method whose values it has, bit for bit; itself where no other has them.
+    pub fn values(self) -> Self {
+        self.entry().same_values_as
+    }
+
     /// The method for whom names none: the last of the list that has the rule that is asked for.
     pub fn for_rule(quadrature: Option<Quadrature>) -> Self {
-        let has = |entry: &&Entry| quadrature.is_none_or(|rule| entry.quadratures.contains(&rule));
+        let has = |entry: &&Entry| quadrature.is_none_or(|rule| entry.method.has(rule));
         METHODS.iter().rev().find(has).expect("every rule has a method").method
     }
 }
@@ -126,6 +169,21 @@ mod tests {
             assert_eq!(Method::parse(method.name()), Ok(method));
         }
         assert!(Method::parse("Sweep").is_err());
+    }
+
+    #[test]
+    fn entries_agree_with_themselves_and_with_those_whose_values_they_have() {
+        for entry in METHODS {
+            assert!(entry.sets.contains(&entry.rays) && !entry.quadratures.is_empty(), "{}", entry.name);
+            let like = entry.method.values().entry();
+            assert_eq!(like.same_values_as, like.method, "{}: whose values are a third's", entry.name);
+            assert_eq!(
+                (like.samples, like.quadratures),
+                (entry.samples, entry.quadratures),
+                "{}",
+                entry.name
+            );
+        }
     }
 
     #[test]

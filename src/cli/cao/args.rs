@@ -2,10 +2,12 @@
 
 use anyhow::{Context, Result};
 pub use cao_cli::args::{Global, Raw, Settings, open, setup, shape, usage};
-use cao_cli::args::{length, number, positive, size, three, triple};
-use cao_measure::stability::Sweep;
+use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
+use cao_measure::stability::Trial;
+use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
 use cao_model::methods::Method;
+use cao_model::occlusion::Quadrature;
 use clap::{ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
 use std::path::PathBuf;
@@ -45,13 +47,13 @@ pub enum Command {
     /// Write a volume's ambient occlusion as a volume: 0 fully occluded, 1 unobstructed
     #[command(after_help = OCCLUSION_EXAMPLES)]
     Occlusion(Occlusion),
-    /// Check on this device that contextual occlusion equals full recomputation, and left eye right eye
+    /// Check on this device that occlusion after a change equals full recomputation, and left eye right eye
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(Verify),
     /// Chart time against error for every method after every kind of change, on this device
     #[command(after_help = CHART_EXAMPLES)]
     Chart(Chart),
-    /// Show where methods fail, ours beside them: data, charts and one sentence for each sweep
+    /// Show where methods fail, ours beside them: data, charts and one sentence for each trial
     #[command(after_help = STABILITY_EXAMPLES)]
     Stability(Stability),
     /// Show a volume's header, value range and histogram
@@ -82,8 +84,12 @@ Examples:
 const VERIFY_EXAMPLES: &str = "\
 Examples:
   cao verify                       all built-in scenes
+  cao verify --method all          with every method
   cao verify builtin:skeleton:64 --poses 20 --seed 3
   cao verify head.nrrd --transfer ct-bone --shapes sphere,torus,tool.obj
+
+Every clip is followed by an update, and the update compared bit by bit with a
+full recomputation of the method: of cao, LAO of every voxel.
 
 Exit code 1 if any voxel or any point that both eyes see differs.";
 
@@ -100,11 +106,11 @@ run of every method. A scene without clips gets a ball.";
 
 const STABILITY_EXAMPLES: &str = "\
 Examples:
-  cao stability -o stability            all sweeps; open stability/index.html
+  cao stability -o stability            all trials; open stability/index.html
   cao stability -o out --quick --only stereo,views
   cao stability --list
 
-Exit code 1 if ours fails where it claims to hold, or the method that a sweep
+Exit code 1 if ours fails where it claims to hold, or the method that a trial
 is there to catch does not.";
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
@@ -180,9 +186,8 @@ pub struct Render {
     pub settings: Settings,
     #[command(flatten)]
     pub budget: Budget,
-    /// sweep: lines of voxels, only where opacities change; cao: rays of the paper, only what the clips change; lao: everything, for
-    /// comparison [default: sweep; cao where --quadrature is left or cell]
-    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion",
+        help = format!("{} [default: {}]", methods_help(), default_method()))]
     pub method: Option<Method>,
     #[command(flatten)]
     pub clips: Clips,
@@ -207,9 +212,8 @@ pub struct Occlusion {
     pub settings: Settings,
     #[command(flatten)]
     pub budget: Budget,
-    /// lao: every ray of every voxel; cao: first without clips, then only what the clips change; sweep: whole lines of voxels at once,
-    /// many times faster [default: lao]
-    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion")]
+    #[arg(long, value_name = "METHOD", value_parser = |s: &str| Method::parse(s), help_heading = "Occlusion",
+        help = format!("{} [default: {}]", methods_help(), OCCLUSION.name()))]
     pub method: Option<Method>,
     /// Compute only voxels that a sample with opacity can touch; the others hold 1
     #[arg(long, help_heading = "Occlusion")]
@@ -237,10 +241,55 @@ pub struct Verify {
     /// Compare every voxel, not only those that a sample with opacity can touch
     #[arg(long)]
     pub all_voxels: bool,
+    #[arg(long, value_name = "METHOD|all", value_parser = verified, help_heading = "Occlusion",
+        help = format!(
+            "Only this method, or all that have the rule of --quadrature. {} [default: {}; and {}, the proof that contextual \
+             occlusion equals full recomputation]",
+            methods_help(), default_method(), PROOF.name()
+        ))]
+    pub method: Option<Verified>,
     #[command(flatten)]
     pub settings: Settings,
     #[command(flatten)]
     pub raw: Raw,
+}
+
+/// What `verify --method` names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verified {
+    /// This method.
+    One(Method),
+    /// Every method.
+    All,
+}
+
+fn verified(text: &str) -> Result<Verified, String> {
+    match text {
+        "all" => Ok(Verified::All),
+        name => Method::parse(name).map(Verified::One).map_err(|error| format!("{error}, all")),
+    }
+}
+
+/// What `occlusion` computes unless told otherwise: the paper's own definition.
+pub const OCCLUSION: Method = Method::Lao;
+
+/// What `verify` verifies beside the default method: the claim of the paper (CAO §4).
+pub const PROOF: Method = Method::Cao;
+
+/// The method for whom names none, and those for whom names a rule that it lacks.
+fn default_method() -> String {
+    let of_rules = |method: Method| {
+        let own = Quadrature::ALL.into_iter().filter(|rule| Method::for_rule(Some(*rule)) == method);
+        own.map(Quadrature::name).collect::<Vec<_>>()
+    };
+    let mut text = Method::default().name().to_owned();
+    for entry in METHODS.iter().filter(|entry| entry.method != Method::default()) {
+        let rules = of_rules(entry.method);
+        if !rules.is_empty() {
+            text += &format!("; {} where --quadrature is {}", entry.name, rules.join(" or "));
+        }
+    }
+    text
 }
 
 #[derive(Args)]
@@ -271,16 +320,16 @@ pub struct Chart {
 
 #[derive(Args)]
 pub struct Stability {
-    /// Folder for index.html, and for each sweep its data (CSV) and charts (SVG, PNG); made where missing
+    /// Folder for index.html, and for each trial its data (CSV) and charts (SVG, PNG); made where missing
     #[arg(short, long, value_name = "DIR", required_unless_present = "list")]
     pub output: Option<PathBuf>,
-    /// Only these sweeps, as --list names them
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Sweep::parse(s))]
-    pub only: Vec<Sweep>,
+    /// Only these trials, as --list names them
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', value_parser = |s: &str| Trial::parse(s))]
+    pub only: Vec<Trial>,
     /// Fewer and coarser steps: under a minute instead of some minutes
     #[arg(long)]
     pub quick: bool,
-    /// Name the sweeps, and do nothing else
+    /// Name the trials, and do nothing else
     #[arg(long)]
     pub list: bool,
 }

@@ -24,7 +24,7 @@ const QUICK_RADIUS: f32 = 6.0;
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let folder = Folder::prepare(args)?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     progress.stage("reading");
     let scenes = scenes(args)?;
     progress.stage("preparing");

@@ -6,7 +6,6 @@ use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use cao_formats::write_nrrd;
-use cao_model::methods::Method;
 use clap::ArgMatches;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,11 +18,11 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let inputs =
         [args.input.as_str(), transfer].into_iter().chain(args.clips.clip.iter().map(String::as_str));
     check_targets(&targets, "nrrd", inputs.map(Path::new))?;
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     let clips = args::clips(matches)?;
     progress.stage("reading");
     let volume = args.raw.open(&args.input)?;
-    let method = args.method.unwrap_or(Method::Lao);
+    let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
     progress.stage("preparing");

@@ -16,7 +16,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let targets: Vec<&Path> =
         args.output.iter().chain(args.eyes.iter().flatten()).map(PathBuf::as_path).collect();
     check_targets(&targets, "png", inputs(args))?;
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     progress.stage("reading");
     let mut scene = match args.input.to_lowercase().ends_with(".toml") {
         true if args.raw.dims.is_some() => {
@@ -77,12 +77,11 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
 fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Result<()> {
     let s = &args.settings;
     let o = &mut scene.occlusion;
-    // A rule that sweeps do not have asks for another method.
-    let by_rule = || s.quadrature.map(|rule| Method::for_rule(Some(rule))).filter(|m| *m != Method::Sweep);
-    let method = match (args.method, o.method) {
-        (None, Method::Sweep) => by_rule().unwrap_or(Method::Sweep),
-        (asked, own) => asked.unwrap_or(own),
-    };
+    // A rule that the scene's method does not have asks for another method.
+    let method = args.method.unwrap_or(match s.quadrature {
+        Some(rule) if !o.method.has(rule) => Method::for_rule(Some(rule)),
+        _ => o.method,
+    });
     if method != o.method {
         // What the scene left to its method is left to this one.
         if o.rays == o.method.rays() {

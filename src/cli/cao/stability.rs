@@ -1,10 +1,10 @@
-//! `cao stability`: the sweeps of where methods fail, as data, charts and one sentence each.
+//! `cao stability`: the trials of where methods fail, as data, charts and one sentence each.
 
 use crate::args::{Global, Stability, usage};
 use anyhow::{Context, Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_formats::write_atomic;
-use cao_measure::stability::{Effort, Finding, Ours, SWEEPS, Sweep, page};
+use cao_measure::stability::{Effort, Finding, Ours, TRIALS, Trial, page};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -12,10 +12,10 @@ use std::process::ExitCode;
 pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     let mut out = Out::new(global);
     if args.list {
-        for sweep in SWEEPS {
-            out.line(format!("{:<12} {}", sweep.name, sweep.title));
+        for trial in TRIALS {
+            out.line(format!("{:<12} {}", trial.name, trial.title));
         }
-        out.json(json!({ "sweeps": SWEEPS.map(|s| json!({ "name": s.name, "title": s.title })) }));
+        out.json(json!({ "trials": TRIALS.map(|s| json!({ "name": s.name, "title": s.title })) }));
         out.finish()?;
         return Ok(ExitCode::SUCCESS);
     }
@@ -23,26 +23,26 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     if folder.exists() && !folder.is_dir() {
         bail!("cannot write into {}: it is a file, expected a folder or a new name", folder.display());
     }
-    let sweeps = match args.only.is_empty() {
-        true => SWEEPS.to_vec(),
+    let trials = match args.only.is_empty() {
+        true => TRIALS.to_vec(),
         false => args.only.clone(),
     };
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
 
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     out.device(&gpu);
     std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut findings = Vec::new();
-    for sweep in sweeps {
-        progress.stage(sweep.name);
-        let finding = (sweep.run)(&gpu, effort, &mut |done| progress.set(done))?;
-        write(folder, sweep, &finding)?;
-        findings.push((sweep, finding));
+    for trial in trials {
+        progress.stage(trial.name);
+        let finding = (trial.run)(&gpu, effort, &mut |done| progress.set(done))?;
+        write(folder, trial, &finding)?;
+        findings.push((trial, finding));
     }
     drop(progress);
     check_validation(&gpu)?;
@@ -57,19 +57,19 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     let html = page::html(&head, &findings);
     let index = folder.join("index.html");
     write_atomic(&index, |file| file.write_all(html.as_bytes()))?;
-    for (sweep, finding) in &findings {
-        out.line(format!("{:<10} {:<8} {}", sweep.name, finding.ours.name(), finding.sentence));
+    for (trial, finding) in &findings {
+        out.line(format!("{:<10} {:<8} {}", trial.name, finding.ours.name(), finding.sentence));
         if !finding.control_fails {
-            out.line("           the method that has to fail here did not: this sweep shows nothing");
+            out.line("           the method that has to fail here did not: this trial shows nothing");
         }
     }
     let good = |f: &Finding| f.ours != Ours::Fails && f.control_fails;
     let all_good = findings.iter().all(|(_, finding)| good(finding));
     out.json(json!({
         "good": all_good,
-        "sweeps": findings.iter().map(|(sweep, f)| json!({
-            "name": sweep.name,
-            "title": sweep.title,
+        "trials": findings.iter().map(|(trial, f)| json!({
+            "name": trial.name,
+            "title": trial.title,
             "ours": f.ours.name(),
             "control_fails": f.control_fails,
             "sentence": f.sentence,
@@ -81,13 +81,13 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     Ok(if all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn write(folder: &Path, sweep: Sweep, finding: &Finding) -> Result<()> {
+fn write(folder: &Path, trial: Trial, finding: &Finding) -> Result<()> {
     let put = |name: String, bytes: &[u8]| write_atomic(&folder.join(name), |file| file.write_all(bytes));
-    put(format!("{}.csv", sweep.name), page::csv(finding).as_bytes())?;
+    put(format!("{}.csv", trial.name), page::csv(finding).as_bytes())?;
     for (n, chart) in finding.charts.iter().enumerate() {
         let drawing = page::draw(chart, &finding.setting);
-        put(format!("{}-{}.svg", sweep.name, n + 1), drawing.svg().as_bytes())?;
-        put(format!("{}-{}.png", sweep.name, n + 1), &drawing.png()?)?;
+        put(format!("{}-{}.svg", trial.name, n + 1), drawing.svg().as_bytes())?;
+        put(format!("{}-{}.png", trial.name, n + 1), &drawing.png()?)?;
     }
     Ok(())
 }

@@ -1,17 +1,19 @@
-//! `cao verify`: the two claims, checked on the user's device and volume.
+//! `cao verify`: the two claims, checked on the user's device and volume, of the methods that he asks for.
 
-use crate::args::{self, Global, Verify, setup};
+use crate::args::{self, Global, PROOF, Verified, Verify, setup};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
-use cao::gpu::Timings;
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_gpu::Timings;
 use cao_measure::exactness::{Plan, Report, verify};
+use cao_model::METHODS;
 use cao_model::clip::Shape;
 use cao_model::methods::Method;
+use cao_model::occlusion::Quadrature;
 use serde_json::json;
 use std::process::ExitCode;
 
-/// The built-in scenes, at a size that takes seconds each; the last has anisotropic spacing.
+/// The built-in scenes, at a size that takes seconds each with each method; the last has anisotropic spacing.
 const BUILT_IN: [&str; 4] =
     ["builtin:engine:40", "builtin:fruit:32", "builtin:skeleton:40", "builtin:engine:40x36x20:1,1,2"];
 
@@ -24,16 +26,18 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
         true => Shape::ANALYTIC.to_vec(),
         false => args.shapes.iter().map(|name| args::shape(name)).collect::<Result<_>>()?,
     };
-    let mut progress = Progress::new();
+    let (methods, left_out) = methods(args.method, args.settings.quadrature);
+    let mut progress = Progress::default();
     progress.stage("reading");
     // All of them before the device works for minutes on the first.
     let mut inputs = Vec::new();
     for name in names {
         let volume = args.raw.open(name)?;
-        let setup = setup(&args.settings, &volume, Method::Cao, args.all_voxels)?;
         let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
         let transfer = cao_formats::transfer::load(transfer, volume.range())?;
-        inputs.push((name, volume, setup, transfer));
+        let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
+        let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
+        inputs.push((name, volume, setups, transfer));
     }
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
@@ -42,40 +46,66 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     let mut exact = true;
     let mut vacuous = false;
     let mut reports = Vec::new();
-    for (input, volume, setup, transfer) in inputs {
-        progress.stage("preparing");
-        let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
-        let plan = Plan { shapes: shapes.clone(), poses: args.poses, seed: args.seed };
-        progress.stage("verifying");
-        let report = verify(&mut renderer, &plan, &mut |done| progress.set(done))?;
-        print(&mut out, input, &report, args.seed);
-        exact &= report.exact();
-        vacuous |= report.vacuous();
-        reports.push(as_json(input, &report));
+    for (input, volume, setups, transfer) in inputs {
+        for setup in setups {
+            progress.stage("preparing");
+            let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR)?;
+            let plan = Plan { shapes: shapes.clone(), poses: args.poses, seed: args.seed };
+            progress.stage("verifying");
+            progress.say(&format!("verifying {}", setup.method.name()));
+            let report = verify(&mut renderer, &plan, &mut |done| progress.set(done))?;
+            print(&mut out, input, setup.method, &report, args.seed);
+            exact &= report.exact();
+            vacuous |= report.vacuous();
+            reports.push(as_json(input, setup.method, &report));
+        }
     }
     drop(progress);
     check_validation(&gpu)?;
+    if let (Some(rule), [_, ..]) = (args.settings.quadrature, &left_out[..]) {
+        out.line(format!("left out, without quadrature {}: {}", rule.name(), left_out.join(", ")));
+    }
     out.line(match (exact, vacuous) {
         (true, _) => "exact: nothing differs",
         (false, true) => "NOT VERIFIED: see the lines above",
         (false, false) => "NOT EXACT: see the lines above",
     });
-    out.json(json!({ "exact": exact, "vacuous": vacuous, "seed": args.seed, "volumes": reports }));
+    out.json(json!({ "exact": exact, "vacuous": vacuous, "seed": args.seed, "volumes": reports, "left_out": left_out }));
     out.finish()?;
     Ok(if exact { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
+/// What to verify, and the names of what is left out, for it lacks the rule that is asked for. A single method that does is refused by
+/// the renderer.
+fn methods(asked: Option<Verified>, rule: Option<Quadrature>) -> (Vec<Method>, Vec<&'static str>) {
+    let named = |method: &Method| match asked {
+        None => *method == Method::for_rule(rule) || *method == PROOF,
+        Some(Verified::One(only)) => *method == only,
+        Some(Verified::All) => true,
+    };
+    let able =
+        |method: &Method| matches!(asked, Some(Verified::One(_))) || rule.is_none_or(|rule| method.has(rule));
+    let named = METHODS.iter().map(|entry| entry.method).filter(named);
+    let (methods, left_out): (Vec<Method>, Vec<Method>) = named.partition(able);
+    (methods, left_out.into_iter().map(Method::name).collect())
+}
+
+fn print(out: &mut Out, input: &str, method: Method, report: &Report, seed: u64) {
     let total = report.total();
     let share = 100.0 * total.recomputed as f64 / total.compared.max(1) as f64;
-    out.line(format!("{input}: {} clips, seed {seed}", report.trials.len()));
+    let like = match method.values() {
+        own if own == method => String::new(),
+        other => format!(" = {}", other.name()),
+    };
+    out.line(format!("{input}, {}{like}: {} clips, seed {seed}", method.name(), report.cuts.len()));
     out.line(format!("  voxels compared     {:>12}", total.compared));
     out.line(format!("  voxels that differ  {:>12}", total.different));
     out.line(format!("  largest difference  {:>12}", total.largest));
     out.line(format!("  share recomputed    {share:>11.1} %"));
     out.line(format!(
-        "  share affected      {:>11.1} % (of all voxels, the paper's measure)",
-        100.0 * report.affected()
+        "  share affected      {:>11.1} % (of all voxels{})",
+        100.0 * report.affected(),
+        if method.values() == PROOF.values() { ", the paper's measure" } else { "" }
     ));
     out.line(format!("  full / contextual   {:>11.2} x (median of times)", report.speedup()));
     let stereo = report.stereo;
@@ -88,8 +118,8 @@ fn print(out: &mut Out, input: &str, report: &Report, seed: u64) {
     } else if stereo.points == 0 {
         out.line("  nothing to compare between the eyes: both see no point; choose another seed or transfer function");
     }
-    for trial in report.trials.iter().filter(|trial| trial.difference.different > 0) {
-        let (clip, d) = (&trial.clip, trial.difference);
+    for cut in report.cuts.iter().filter(|cut| cut.difference.different > 0) {
+        let (clip, d) = (&cut.clip, cut.difference);
         out.line(format!(
             "  {} voxels differ by up to {} for {} {:?} {:?}",
             d.different,
@@ -105,20 +135,21 @@ fn stages(timings: &Timings) -> serde_json::Value {
     timings.iter().map(|timing| (timing.stage.name, serde_json::Value::from(timing.ms))).collect()
 }
 
-fn as_json(input: &str, report: &Report) -> serde_json::Value {
+fn as_json(input: &str, method: Method, report: &Report) -> serde_json::Value {
     let total = report.total();
     json!({
         "volume": input,
-        "clips": report.trials.iter().map(|trial| json!({
-            "shape": trial.clip.shape.name(),
-            "mode": format!("{:?}", trial.clip.mode).to_lowercase(),
-            "translate_mm": trial.clip.pose.translate_mm.to_array(),
-            "rotate_deg": trial.clip.pose.rotate_deg.to_array(),
-            "scale": trial.clip.pose.scale.to_array(),
-            "voxels_different": trial.difference.different,
-            "affected": trial.categories.affected,
-            "contextual_ms": stages(&trial.contextual),
-            "full_ms": stages(&trial.full),
+        "method": method.name(),
+        "clips": report.cuts.iter().map(|cut| json!({
+            "shape": cut.clip.shape.name(),
+            "mode": format!("{:?}", cut.clip.mode).to_lowercase(),
+            "translate_mm": cut.clip.pose.translate_mm.to_array(),
+            "rotate_deg": cut.clip.pose.rotate_deg.to_array(),
+            "scale": cut.clip.pose.scale.to_array(),
+            "voxels_different": cut.difference.different,
+            "affected": cut.categories.affected,
+            "contextual_ms": stages(&cut.contextual),
+            "full_ms": stages(&cut.full),
         })).collect::<Vec<_>>(),
         "voxels_compared": total.compared,
         "voxels_different": total.different,
@@ -131,4 +162,32 @@ fn as_json(input: &str, report: &Report) -> serde_json::Value {
         "points_different": report.stereo.different,
         "largest_difference_between_eyes": report.stereo.largest,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_method_the_default_and_the_proof_are_verified() {
+        let of = |asked, rule| methods(asked, rule).0;
+        assert_eq!(of(None, None), [PROOF, Method::default()]);
+        for rule in Quadrature::ALL {
+            let found = of(None, Some(rule));
+            assert!(found.contains(&PROOF) && found.contains(&Method::for_rule(Some(rule))), "{rule:?}");
+            assert!(found.iter().all(|method| method.has(rule)), "{rule:?}");
+        }
+        let all: Vec<Method> = METHODS.iter().map(|entry| entry.method).collect();
+        assert_eq!(methods(Some(Verified::All), None), (all, vec![]));
+    }
+
+    #[test]
+    fn a_method_without_the_rule_is_left_out_of_all_and_refused_by_itself() {
+        let rule = Some(Quadrature::Left);
+        let (found, left_out) = methods(Some(Verified::All), rule);
+        assert!(found.iter().all(|method| method.has(Quadrature::Left)));
+        assert_eq!((left_out, found.len()), (vec!["sweep"], METHODS.len() - 1));
+        // By the renderer.
+        assert_eq!(methods(Some(Verified::One(Method::Sweep)), rule), (vec![Method::Sweep], vec![]));
+    }
 }

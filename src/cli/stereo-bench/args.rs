@@ -1,8 +1,8 @@
 //! Flags and their meaning.
 
-use super::method::Method;
 use super::scale::Series;
-use cao_cli::args::{Global, Raw, Settings, size};
+use super::way::Way;
+use cao_cli::args::{Global, Raw, Settings, methods_help, size};
 use clap::Parser;
 use std::path::PathBuf;
 
@@ -13,10 +13,13 @@ pub struct Cli {
     /// Volume file or builtin:NAME:SIZE
     #[arg(default_value = "builtin:engine:128")]
     pub input: String,
-    /// Methods, which take turns frame by frame. solid: no occlusion; lao: computed anew in every frame; cao: what the clip changed;
-    /// cao-literal: the paper's recipe to the letter; sweep: line sweeps by the rule `segment`, what the clip changed
-    #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Method::parse, default_values_t = Method::ALL)]
-    pub methods: Vec<Method>,
+    #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Way::parse, default_values_t = Way::all(),
+        help = format!(
+            "Methods, which take turns frame by frame. solid: no occlusion; {}; cao-literal: cao by the paper's recipe to the letter. One that \
+             lacks the rule of --quadrature takes its own",
+            methods_help()
+        ))]
+    pub methods: Vec<Way>,
     /// Pixels of one view
     #[arg(long, value_name = "WxH", value_parser = size, default_value = "512x512")]
     pub size: [u32; 2],

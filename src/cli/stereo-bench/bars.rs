@@ -10,11 +10,11 @@ use super::statistics::median;
 use anyhow::{Context, Result};
 use cao::cast::lao::{Bindings, Work};
 use cao::cast::volumes::{Kernels, Volumes};
-use cao::host::read_values;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
+use cao::host::read_values;
 use cao::renderer::{COLOUR, Renderer};
 use cao::stages;
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
@@ -25,9 +25,8 @@ use cao_measure::reference::{Plan, ambient};
 use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::lattice::LatticeRays;
 use cao_model::methods::Method;
-use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::Scope;
-use cao_model::settings::Setup;
+use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
 use cao_twin::Grid;
@@ -86,11 +85,9 @@ impl Scene {
 }
 
 fn setup(scene: &Scene, rays: RaySet, radius_voxels: f32, scope: Scope) -> Setup {
-    let mut setup = Setup::of(cao_model::methods::Method::Cao, scene.volume.min_spacing());
-    setup.method = Method::Sweep;
+    let mut setup = Setup::of(Method::Sweep, scene.volume.min_spacing());
     setup.scope = scope;
     setup.occlusion.rays = rays;
-    setup.occlusion.quadrature = Quadrature::Segment;
     setup.occlusion.radius_mm = radius_voxels * scene.voxel();
     setup
 }
@@ -346,7 +343,7 @@ fn real(folder: &Path, name: &str, threshold: f32) -> Result<Scene> {
 }
 
 pub fn run(cli: &Cli) -> Result<ExitCode> {
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     progress.stage("reading");
     let built_in = Scene::new("builtin:engine:128", cao_formats::open("builtin:engine:128")?, 60.0)?;
     let data = cli.data.as_deref();

@@ -1,12 +1,12 @@
 //! The frames of some configurations: every method of each in turn, along the path, timed.
 
-use cao_measure::split::Split;
-use super::method::Method;
 use super::path;
+use super::way::Way;
 use anyhow::{Context, Result};
 use cao::method::Categories;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_measure::split::Split;
 use cao_model::clip::Shape;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -35,7 +35,7 @@ pub struct Configuration {
 
 /// What is done in every configuration.
 pub struct Plan {
-    pub methods: Vec<Method>,
+    pub methods: Vec<Way>,
     /// What moves through the volume.
     pub clip: Option<Shape>,
     pub frames: u32,
@@ -76,7 +76,7 @@ impl Frame {
 
 /// A method's frames.
 pub struct Measured {
-    pub method: Method,
+    pub method: Way,
     /// In each run the frames that count, in order.
     pub runs: Vec<Vec<Frame>>,
 }
@@ -89,7 +89,7 @@ impl Measured {
 }
 
 /// A method's renderer in one configuration.
-struct Subject<'a> {
+struct Runner<'a> {
     configuration: &'a Configuration,
     target: Rc<Target>,
     renderer: Renderer,
@@ -129,50 +129,50 @@ pub fn measure(
     plan: &Plan,
     progress: &mut dyn FnMut(),
 ) -> Result<Vec<Vec<Measured>>> {
-    let mut subjects = Vec::new();
+    let mut runners = Vec::new();
     for configuration in configurations {
         let Configuration { size: [width, height], views, .. } = configuration;
         let target = Target::new(gpu, configuration)
             .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
         let target = Rc::new(target);
         for &method in &plan.methods {
-            let subject = Subject::new(gpu, configuration, &target, plan, method);
-            subjects.push(subject.with_context(|| method.name())?);
+            let runner = Runner::new(gpu, configuration, &target, plan, method);
+            runners.push(runner.with_context(|| method.name())?);
         }
     }
     for _ in 0..plan.runs {
-        subjects.iter_mut().for_each(|subject| subject.measured.runs.push(Vec::new()));
+        runners.iter_mut().for_each(|runner| runner.measured.runs.push(Vec::new()));
         for frame in -i64::from(plan.warm_up)..i64::from(plan.frames) {
-            for subject in &mut subjects {
-                let drawn = subject.draw(gpu, plan, frame)?;
-                if let (0.., Some(run)) = (frame, subject.measured.runs.last_mut()) {
+            for runner in &mut runners {
+                let drawn = runner.draw(gpu, plan, frame)?;
+                if let (0.., Some(run)) = (frame, runner.measured.runs.last_mut()) {
                     run.push(drawn);
                 }
                 progress();
             }
         }
     }
-    let mut measured = subjects.into_iter().map(|subject| subject.measured);
+    let mut measured = runners.into_iter().map(|runner| runner.measured);
     Ok(configurations.iter().map(|_| measured.by_ref().take(plan.methods.len()).collect()).collect())
 }
 
-impl<'a> Subject<'a> {
+impl<'a> Runner<'a> {
     /// A renderer with all that does not change from frame to frame.
     fn new(
         gpu: &Gpu,
         configuration: &'a Configuration,
         target: &Rc<Target>,
         plan: &Plan,
-        method: Method,
+        method: Way,
     ) -> Result<Self> {
         let input = &configuration.input;
         let setup = method.setup(configuration.setup);
         let renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
         let measured = Measured { method, runs: Vec::new() };
-        let mut subject = Self { configuration, target: target.clone(), renderer, measured };
-        subject.move_clip(plan, -1 - i64::from(plan.warm_up))?;
-        subject.renderer.update(&mut |_| ())?;
-        Ok(subject)
+        let mut runner = Self { configuration, target: target.clone(), renderer, measured };
+        runner.move_clip(plan, -1 - i64::from(plan.warm_up))?;
+        runner.renderer.update(&mut |_| ())?;
+        Ok(runner)
     }
 
     fn move_clip(&mut self, plan: &Plan, frame: i64) -> Result<()> {
@@ -208,8 +208,9 @@ mod tests {
     #[test]
     fn what_no_stage_accounts_for_is_overhead() {
         let mut stages = Timings::new();
-        [(cao::stages::CLASSIFY, 1.0), (cao::stages::CONTEXTUAL, 4.5), (cao::stages::RAYCAST, 2.0)]
-            .map(|(stage, ms)| stages.push(stage, ms));
+        let frame =
+            [(cao::stages::CLASSIFY, 1.0), (cao::stages::CONTEXTUAL, 4.5), (cao::stages::RAYCAST, 2.0)];
+        frame.into_iter().for_each(|(stage, ms)| stages.push(stage, ms));
         let mut frame = Frame { wall: 8.0, stages, categories: Categories::default() };
         assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
         // Clocks of device and host may disagree by a little; no time is negative.

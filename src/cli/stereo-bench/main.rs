@@ -12,13 +12,13 @@ mod bars;
 mod csv;
 mod frames;
 mod machine;
-mod method;
 mod path;
 mod report;
 mod save;
 mod scale;
 mod statistics;
 mod suite;
+mod way;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -1,11 +1,12 @@
 //! What was measured, as tables for people and as JSON for machines.
 
 use super::frames::{Configuration, Frame, Measured, PARTS, Plan};
-use super::method::Method;
 use super::path;
 use super::statistics::{median, percentile};
 use super::suite::Outcome;
+use super::way::Way;
 use anyhow::Result;
+use cao_gpu::Stage;
 use cao_model::view::View;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
@@ -38,7 +39,7 @@ fn affected(measured: &Measured) -> f64 {
 
 /// How many times as long LAO takes: the median over the frames, each compared with the one before or after it (CAO Table 3).
 fn speedup(measured: &Measured, all: &[Measured]) -> Option<f64> {
-    let lao = all.iter().find(|m| m.method == Method::Lao)?;
+    let lao = all.iter().find(|m| m.method == Way::BASELINE)?;
     let ratios: Vec<f64> =
         lao.frames().zip(measured.frames()).map(|(lao, own)| lao.wall / own.wall).collect();
     Some(median(&ratios))
@@ -76,7 +77,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
             m.method.name()
         ));
     }
-    if all.iter().any(|m| m.method == Method::Lao) {
+    if all.iter().any(|m| m.method == Way::BASELINE) {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
@@ -138,7 +139,7 @@ pub fn path_json(c: &Configuration, plan: &Plan) -> Result<Value> {
     };
     // The path closes.
     let frames = (0..plan.frames.min(path::PERIOD).into()).map(frame).collect::<Result<Vec<_>>>()?;
-    let look = Method::Cao.look();
+    let look = Way::BASELINE.look();
     Ok(json!({
         "ambient": look.ambient,
         "diffuse": look.diffuse,
@@ -205,17 +206,15 @@ fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
 
 /// Median time of every stage, by the stage's own name; a stage that a frame lacks took no time in it.
 fn stages(m: &Measured) -> Map<String, Value> {
-    let mut names: Vec<&str> = Vec::new();
+    let mut stages: Vec<Stage> = Vec::new();
     for timing in m.frames().flat_map(|frame| &frame.stages) {
-        if !names.contains(&timing.stage.name) {
-            names.push(timing.stage.name);
+        if !stages.contains(&timing.stage) {
+            stages.push(timing.stage);
         }
     }
-    let time = |frame: &Frame, name: &str| -> f64 {
-        frame.stages.iter().filter(|t| t.stage.name == name).map(|t| t.ms).sum()
+    let time = |frame: &Frame, stage: Stage| -> f64 {
+        frame.stages.iter().filter(|t| t.stage == stage).map(|t| t.ms).sum()
     };
-    names
-        .into_iter()
-        .map(|name| (name.to_owned(), median(&m.frames().map(|f| time(f, name)).collect::<Vec<_>>()).into()))
-        .collect()
+    let times = |stage| m.frames().map(|frame| time(frame, stage)).collect::<Vec<_>>();
+    stages.into_iter().map(|stage| (stage.name.to_owned(), median(&times(stage)).into())).collect()
 }

@@ -2,7 +2,6 @@
 
 use super::args::Cli;
 use super::frames::{Configuration, Input, Measured, Plan, measure};
-use super::method::Method;
 use super::path::PERIOD;
 use super::save::Folder;
 use super::{csv, machine, report};
@@ -10,6 +9,7 @@ use anyhow::{Context, Result};
 use cao_cli::args::{open, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use cao_gpu::DeviceKind;
+use cao_model::methods::{Method, Samples};
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,7 +24,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     let targets: Vec<&Path> = cli.csv.iter().map(PathBuf::as_path).collect();
     check_targets(&targets, "csv", inputs.into_iter().map(Path::new))?;
     let mut plan = plan(cli)?;
-    let mut progress = Progress::new();
+    let mut progress = Progress::default();
     progress.stage("reading");
     let base = base(cli, transfer)?;
     let groups = groups(cli, base, transfer)?;
@@ -89,11 +89,12 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
-    if plan.methods.contains(&Method::Sweep) {
-        let (o, spacing) = (Method::Sweep.setup(*setup).occlusion, input.volume.min_spacing());
+    let setups = plan.methods.iter().map(|way| (way, way.setup(*setup)));
+    for (way, own) in setups.filter(|(_, own)| own.method.entry().samples == Samples::Lattice) {
+        let (o, spacing) = (own.occlusion, input.volume.min_spacing());
         let (rule, step, from) = (o.quadrature.name(), o.lattice_step(spacing), o.lattice_offset(spacing));
         out.line(format!(
-            "          of sweeps quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
+            "          of {way} quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
         ));
     }
     out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
@@ -166,7 +167,7 @@ fn plan(cli: &Cli) -> Result<Plan> {
 
 fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
-    let setup = setup(&cli.settings, &volume, cao_model::methods::Method::Cao, cli.all_voxels)?;
+    let setup = setup(&cli.settings, &volume, Method::Cao, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })

@@ -1,6 +1,7 @@
 //! Every run as a line of comma-separated values (RFC 4180): what was changed, each stage's time, the errors.
 
 use super::{Chart, Point, SceneChart};
+use cao_gpu::Stage;
 use std::fmt::Write as _;
 
 /// The whole table, its first line the names of the columns. Times in ms, lengths in mm; a stage that a method does not have
@@ -8,7 +9,7 @@ use std::fmt::Write as _;
 pub fn runs(chart: &Chart) -> String {
     let stages = stages(chart);
     let mut text = String::from("scene,dims,radius_mm,change,method,setting,details,run,");
-    stages.iter().for_each(|stage| text += &format!("{}_ms,", stage.replace(' ', "_")));
+    stages.iter().for_each(|stage| text += &format!("{}_ms,", stage.name.replace(' ', "_")));
     text += "total_ms,ratio,errors_at,points,rmse,max,bias,rmse_shape,ssim3d\r\n";
     for scene in &chart.scenes {
         for point in &scene.points {
@@ -18,19 +19,19 @@ pub fn runs(chart: &Chart) -> String {
     text
 }
 
-/// Names of all stages, in the order in which they first appear.
-fn stages(chart: &Chart) -> Vec<&str> {
-    let mut names: Vec<&str> = Vec::new();
+/// All stages, in the order in which they first appear.
+fn stages(chart: &Chart) -> Vec<Stage> {
+    let mut stages: Vec<Stage> = Vec::new();
     let points = chart.scenes.iter().flat_map(|scene| &scene.points);
     for timing in points.flat_map(|point| &point.runs).flat_map(|run| &run.stages) {
-        if !names.contains(&timing.stage.name) {
-            names.push(timing.stage.name);
+        if !stages.contains(&timing.stage) {
+            stages.push(timing.stage);
         }
     }
-    names
+    stages
 }
 
-fn lines(text: &mut String, scene: &SceneChart, point: &Point, stages: &[&str]) {
+fn lines(text: &mut String, scene: &SceneChart, point: &Point, stages: &[Stage]) {
     let [x, y, z] = scene.dims;
     let e = &point.errors;
     let ssim = point.ssim_3d.map_or(String::new(), |ssim| ssim.to_string());
@@ -48,7 +49,7 @@ fn lines(text: &mut String, scene: &SceneChart, point: &Point, stages: &[&str]) 
         ];
         *text += &head.join(",");
         for stage in stages {
-            let parts = run.stages.iter().filter(|t| t.stage.name == *stage).map(|t| t.ms);
+            let parts = run.stages.iter().filter(|t| t.stage == *stage).map(|t| t.ms);
             let ms = parts.reduce(|a, b| a + b);
             *text += &ms.map_or(",".into(), |ms| format!(",{ms}"));
         }

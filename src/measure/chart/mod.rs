@@ -13,7 +13,7 @@ pub mod pictures;
 pub mod report;
 pub mod tables;
 
-use super::contender::{self, Ambient, Asked, BASELINE, Change, Contender, Entry, Setting, State, Subject};
+use super::contender::{self, Arena, Asked, BASELINE, Change, Contender, Entrant, Setting, State, Values};
 use super::error::{Errors, errors, shape_errors};
 use super::reference::{self, Reference};
 use super::split::Split;
@@ -25,6 +25,7 @@ use cao_gpu::{DeviceKind, Gpu, Timings};
 use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::mesh::TriangleMesh;
+use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::settings::Setup;
 use cao_model::view::{StereoRig, View};
@@ -275,7 +276,7 @@ impl Work {
     }
 
     /// Of one update of a contender.
-    fn update(scene: &Scene, entry: &Entry) -> f64 {
+    fn update(scene: &Scene, entry: &Entrant) -> f64 {
         let samples = f64::from(scene.state.radius_mm) / scene.volume.min_spacing();
         // Whatever it does, it does something.
         (entry.work * samples + 10.0) * scene.volume.len() as f64
@@ -314,8 +315,8 @@ fn one(
     say("preparing", work);
     let far = 3.0 * (scene.rig.position - scene.rig.target).length().max(1.0);
     let views = scene.rig.views(plan.size[0] as f32 / plan.size[1] as f32, 0.02 * far, far)?;
-    let subject = Subject { gpu, volume: &scene.volume, views: &views, size: plan.size };
-    let mut stand = Stand::new(subject, scene)?;
+    let arena = Arena { gpu, volume: &scene.volume, views: &views, size: plan.size };
+    let mut stand = Stand::new(arena, scene)?;
     let mut truths = Vec::new();
     for change in Change::ALL {
         say("reference", work);
@@ -345,8 +346,8 @@ fn one(
         false => Vec::new(),
     };
     for (n, others) in entries.chunks(group(scene)).enumerate() {
-        let compete: Vec<&Entry> = std::iter::once(&baseline).chain(others).collect();
-        let found = compete_in(scene, subject, plan, &compete, &truths, &featured, work, say)?;
+        let compete: Vec<&Entrant> = std::iter::once(&baseline).chain(others).collect();
+        let found = compete_in(scene, arena, plan, &compete, &truths, &featured, work, say)?;
         // The baseline's first runs stand for it.
         let own = usize::from(n > 0);
         points.extend(found.0.into_iter().skip(own * Change::ALL.len()));
@@ -386,9 +387,9 @@ type Found = (Vec<Point>, Vec<(&'static str, f64)>, Vec<Shown>);
 #[expect(clippy::too_many_arguments, reason = "what competes, on what, and who listens, each named once")]
 fn compete_in(
     scene: &Scene,
-    subject: Subject,
+    arena: Arena,
     plan: &Plan,
-    entries: &[&Entry],
+    entries: &[&Entrant],
     truths: &[Known],
     featured: &[(&str, Setting)],
     work: &mut Work,
@@ -397,7 +398,7 @@ fn compete_in(
     say("preparing", work);
     let mut open: Vec<Box<dyn Contender + '_>> = Vec::new();
     for entry in entries {
-        open.push((entry.open)(subject, &scene.state)?);
+        open.push((entry.open)(arena, &scene.state)?);
         work.done += Work::update(scene, entry);
         say("preparing", work);
     }
@@ -414,7 +415,7 @@ fn compete_in(
                 // The sum of nothing is -0.
                 let total_ms = 0.0 + stages.total();
                 if run == 0 {
-                    points[n].push(truth.judge(scene, subject, entry, change, &contender.ambient()?));
+                    points[n].push(truth.judge(scene, arena, entry, change, &contender.ambient()?));
                     continue;
                 }
                 if n == 0 {
@@ -461,7 +462,7 @@ fn compete_in(
 /// The scene without any contender: what there is to see, and the truth about it.
 struct Stand<'a> {
     scene: &'a Scene,
-    subject: Subject<'a>,
+    arena: Arena<'a>,
     renderer: Renderer,
 }
 
@@ -475,16 +476,16 @@ struct Known {
 }
 
 impl<'a> Stand<'a> {
-    fn new(subject: Subject<'a>, scene: &'a Scene) -> Result<Self> {
+    fn new(arena: Arena<'a>, scene: &'a Scene) -> Result<Self> {
         // Rays as few as can be: only the opacity and the categories are of interest.
-        let paper = Setup::of(cao_model::methods::Method::Cao, scene.volume.min_spacing());
+        let paper = Setup::of(Method::Cao, scene.volume.min_spacing());
         let occlusion = Occlusion { rays: RaySet::R6, radius_mm: scene.state.radius_mm, ..paper.occlusion };
         let setup = Setup { occlusion, ..paper };
         let transfer = scene.state.transfer.clone();
-        let mut renderer = Renderer::new(subject.gpu, &scene.volume, transfer, setup, COLOUR)?;
+        let mut renderer = Renderer::new(arena.gpu, &scene.volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&scene.state.clips)?;
         renderer.update(&mut |_| ())?;
-        Ok(Self { scene, subject, renderer })
+        Ok(Self { scene, arena, renderer })
     }
 
     /// The reference of the state after a change.
@@ -494,7 +495,7 @@ impl<'a> Stand<'a> {
         self.renderer.set_clips(&state.clips)?;
         self.renderer.update(&mut |_| ())?;
         let opacity = self.renderer.read_opacity()?;
-        let (gpu, grid) = (self.subject.gpu, self.scene.grid());
+        let (gpu, grid) = (self.arena.gpu, self.scene.grid());
         let smallest = grid.min_spacing();
         // Where the contenders' rays start: half a step.
         let (radius, offset) = (f64::from(state.radius_mm), 0.5 * smallest);
@@ -503,10 +504,9 @@ impl<'a> Stand<'a> {
         let quiet = &mut |_| ();
         let reference = reference::ambient(gpu, &grid, &opacity, radius, offset, length, plan, quiet)?;
 
-        let (image, _) =
-            self.renderer.draw(self.subject.views, &contender::surface_look(), self.subject.size)?;
-        let shown = surface_points(&grid, &self.subject.views[0], self.subject.size, &image.depth[0]);
-        let (stride, shown) = thinned(shown, self.subject.size[0] as usize, most);
+        let (image, _) = self.renderer.draw(self.arena.views, &contender::surface_look(), self.arena.size)?;
+        let shown = surface_points(&grid, &self.arena.views[0], self.arena.size, &image.depth[0]);
+        let (stride, shown) = thinned(shown, self.arena.size[0] as usize, most);
         let points: Vec<[f64; 3]> = shown.iter().map(|(point, _)| *point).collect();
         let values =
             reference::ambient_at(gpu, &grid, &opacity, &points, radius, offset, length, plan, quiet)?;
@@ -570,23 +570,16 @@ impl Known {
     }
 
     /// A contender's errors, its runs still to come.
-    fn judge(
-        &self,
-        scene: &Scene,
-        subject: Subject,
-        entry: &Entry,
-        change: Change,
-        found: &Ambient,
-    ) -> Point {
+    fn judge(&self, scene: &Scene, arena: Arena, entry: &Entrant, change: Change, found: &Values) -> Point {
         let (of_surface, expected);
         let (found, reference, counts, ssim_3d) = match found {
-            Ambient::Voxels(values) => {
+            Values::Voxels(values) => {
                 let Reference { ambient, counts, .. } = &self.reference;
                 let ssim = ssim_3d(&scene.grid(), values, ambient, counts, Constants::PRINTED);
                 (values, ambient, counts.clone(), Some(ssim))
             }
-            Ambient::Pixels(values) => {
-                debug_assert_eq!(values.len(), (subject.size[0] * subject.size[1]) as usize);
+            Values::Pixels(values) => {
+                debug_assert_eq!(values.len(), (arena.size[0] * arena.size[1]) as usize);
                 of_surface = self.surface.iter().map(|(_, pixel, _)| values[*pixel]).collect::<Vec<f32>>();
                 expected = self.surface.iter().map(|(.., value)| *value).collect::<Vec<f32>>();
                 let counts = vec![true; expected.len()];

@@ -1,7 +1,7 @@
 //! What each method shows, and where it errs: the left eye's picture, and beside it the error of the ambient factor on the surface
 //! that it shows.
 
-use super::{Ambient, Entry, Known, Setting};
+use super::{Entrant, Known, Setting, Values};
 use crate::error::{Errors, errors};
 use cao::renderer::StereoImage;
 use cao_formats::Picture;
@@ -31,7 +31,9 @@ const BACKGROUND: [f32; 3] = [0.008_568_126, 0.009_721_218, 0.012_286_488];
 const NOTHING: [u8; 3] = [0xd8, 0xd8, 0xd8];
 
 /// One setting of each method: 26 weighted rays with the segment rule where there are such, else the paper's 26, else any.
-pub(super) fn featured<'a>(entries: impl Iterator<Item = &'a Entry> + Clone) -> Vec<(&'static str, Setting)> {
+pub(super) fn featured<'a>(
+    entries: impl Iterator<Item = &'a Entrant> + Clone,
+) -> Vec<(&'static str, Setting)> {
     let mut chosen: Vec<(&'static str, Setting)> = Vec::new();
     for entry in entries.clone() {
         if chosen.iter().any(|(method, _)| *method == entry.method) {
@@ -51,11 +53,11 @@ pub(super) fn featured<'a>(entries: impl Iterator<Item = &'a Entry> + Clone) -> 
 
 impl Known {
     /// A contender's pictures.
-    pub(super) fn shown(&self, grid: &Grid, entry: &Entry, image: &StereoImage, found: &Ambient) -> Shown {
+    pub(super) fn shown(&self, grid: &Grid, entry: &Entrant, image: &StereoImage, found: &Values) -> Shown {
         let [width, height] = image.size;
         let value = |point: [f64; 3], pixel: usize| match found {
-            Ambient::Voxels(values) => trilinear_clamped(grid, values, point) as f32,
-            Ambient::Pixels(values) => values[pixel],
+            Values::Voxels(values) => trilinear_clamped(grid, values, point) as f32,
+            Values::Pixels(values) => values[pixel],
         };
         let small = [width, height].map(|edge| edge.div_ceil(self.stride as u32));
         let mut pixels = vec![NOTHING; (small[0] * small[1]) as usize];

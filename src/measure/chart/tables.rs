@@ -1,10 +1,13 @@
 //! The paper's tables with our numbers beside the printed ones (CAO Tables 1 to 3, Fig. 9), as HTML.
 
-use crate::split::Split;
 use super::draw::{self, Mark, with_spread};
 use super::peers::Peers;
 use super::{BASELINE, Change, Chart, Point, SceneChart};
+use crate::contender::{self, SOLID};
 use crate::plot::{Anchor, Drawing, INK, short, text_width};
+use crate::split::Split;
+use cao_model::methods::Method;
+use cao_model::occlusion::Quadrature;
 use std::fmt::Write as _;
 
 /// CAO Table 1: author, name, quality, real-time modification to radius, transfer function, clipping.
@@ -152,10 +155,12 @@ pub(super) fn table_3(chart: &Chart) -> String {
     }
     for scene in &chart.scenes {
         for rays in RAYS {
-            let (Some(lao), Some(cao)) = (frame(scene, BASELINE, rays), frame(scene, "CAO", rays)) else {
+            let (Some(lao), Some(cao)) =
+                (frame(scene, BASELINE, rays), frame(scene, contender::name(Method::Cao), rays))
+            else {
                 continue;
             };
-            let times = [drawing(scene, "solid colour"), lao.total(), cao.total()];
+            let times = [drawing(scene, SOLID), lao.total(), cao.total()];
             let rates = times.map(|ms| short(1e3 / ms));
             rows.push(row(escaped(&scene.name), rays, rates, lao.total() / cao.total()));
         }
@@ -179,7 +184,7 @@ fn drawing(scene: &SceneChart, method: &str) -> f64 {
 /// The frame of a method with the paper's sum and so many equal rays.
 fn frame(scene: &SceneChart, method: &str, rays: &str) -> Option<Split> {
     let own = |p: &&Point| {
-        let left = p.setting.quadrature == Some(cao_model::occlusion::Quadrature::Left);
+        let left = p.setting.quadrature == Some(Quadrature::Left);
         p.change == Change::Clip && p.method == method && p.setting.label == rays && left
     };
     let point = scene.points.iter().find(own)?;
@@ -201,7 +206,7 @@ pub(super) fn figure_9(chart: &Chart) -> Drawing {
     let mut bars = Vec::new();
     for scene in &chart.scenes {
         for rays in ["6", "26", "54"] {
-            for method in [BASELINE, "CAO"] {
+            for method in [BASELINE, contender::name(Method::Cao)] {
                 if let Some(parts) = frame(scene, method, rays) {
                     bars.push((format!("{}, {rays} rays, {method}", scene.name), parts));
                 }

@@ -5,12 +5,15 @@
 //! a sphere where the others shade all of it; twice their ambient factor is what it stands for, and so its values are halved.
 
 use super::rendered::{change_to, with_radius};
-use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject, surface_look};
+use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values, surface_look};
 use crate::Result;
 use crate::kernels::ssao::Ssao;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
-use cao_gpu::{Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage, Timings};
+use cao_gpu::{
+    Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage, Timings,
+};
 use cao_model::look::Look;
+use cao_model::methods::Method;
 use cao_model::settings::Setup;
 
 const IMAGE_SPACE: Stage = Stage::new("image space", Phase::Ambient);
@@ -22,26 +25,26 @@ const BIAS_VOXELS: f64 = 0.25;
 const HALF_SPHERE: f32 = 0.5;
 
 /// Numbers of points in the hemisphere.
-pub fn entries(asked: &Asked) -> Vec<Entry> {
+pub fn entrants(name: &'static str, asked: &Asked) -> Vec<Entrant> {
     let samples: &[u32] = if asked.quick { &[32] } else { &[8, 32, 128] };
-    samples.iter().map(|&samples| entry(samples)).collect()
+    samples.iter().map(|&samples| entrant(name, samples)).collect()
 }
 
-fn entry(samples: u32) -> Entry {
-    Entry {
-        method: "image space",
+fn entrant(name: &'static str, samples: u32) -> Entrant {
+    Entrant {
+        method: name,
         setting: Setting {
             label: format!("{samples} samples"),
             quadrature: None,
             details: format!("both eyes' depth images, bias {BIAS_VOXELS} voxel; halved"),
         },
         work: 0.5,
-        open: Box::new(move |subject, state| Ok(Box::new(ImageSpace::open(subject, state, samples)?))),
+        open: Box::new(move |arena, state| Ok(Box::new(ImageSpace::open(arena, state, samples)?))),
     }
 }
 
 struct ImageSpace<'a> {
-    subject: Subject<'a>,
+    arena: Arena<'a>,
     renderer: Renderer,
     setup: Setup,
     ssao: Ssao,
@@ -55,9 +58,9 @@ struct ImageSpace<'a> {
 }
 
 impl<'a> ImageSpace<'a> {
-    fn open(subject: Subject<'a>, state: &State, samples: u32) -> Result<Self> {
-        let Subject { gpu, volume, size: [width, height], .. } = subject;
-        let setup = with_radius(Setup::of(cao_model::methods::Method::Cao, volume.min_spacing()), 0.0);
+    fn open(arena: Arena<'a>, state: &State, samples: u32) -> Result<Self> {
+        let Arena { gpu, volume, size: [width, height], .. } = arena;
+        let setup = with_radius(Setup::of(Method::Cao, volume.min_spacing()), 0.0);
         let mut renderer = Renderer::new(gpu, volume, state.transfer.clone(), setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         let target = |name, format| {
@@ -69,7 +72,7 @@ impl<'a> ImageSpace<'a> {
         };
         let bytes = 4 * u64::from(width) * u64::from(height);
         let mut made = Self {
-            subject,
+            arena,
             renderer,
             setup,
             ssao: Ssao::new(gpu)?,
@@ -90,7 +93,7 @@ impl<'a> ImageSpace<'a> {
     /// Draws the frame, then shades both eyes' depth. The time is that of the shading.
     fn shade(&mut self) -> Result<Timings> {
         self.renderer.update(&mut |_| ())?;
-        let Subject { gpu, volume, views, size, .. } = self.subject;
+        let Arena { gpu, volume, views, size, .. } = self.arena;
         let mut rec = gpu.recorder("image-space frame")?;
         rec.discard(&self.colour);
         rec.discard(&self.depth);
@@ -112,7 +115,7 @@ impl<'a> ImageSpace<'a> {
     /// One a pixel.
     fn factors(&self, eye: usize) -> Result<Vec<f32>> {
         let (from, to) = (&self.occlusion[eye], &self.read_back);
-        let mut rec = self.subject.gpu.recorder("read image space")?;
+        let mut rec = self.arena.gpu.recorder("read image space")?;
         rec.copy_buffer(from, 0, to, 0, from.bytes())?;
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         rec.submit_and_wait()?;
@@ -128,14 +131,14 @@ impl Contender for ImageSpace<'_> {
         self.shade()
     }
 
-    fn ambient(&self) -> Result<Ambient> {
+    fn ambient(&self) -> Result<Values> {
         let halved = self.factors(0)?.into_iter().map(|factor| HALF_SPHERE * factor);
-        Ok(Ambient::Pixels(halved.collect()))
+        Ok(Values::Pixels(halved.collect()))
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
         let look = Look { occluded: false, ..*look };
-        let (mut image, timings) = self.renderer.draw(self.subject.views, &look, self.subject.size)?;
+        let (mut image, timings) = self.renderer.draw(self.arena.views, &look, self.arena.size)?;
         for eye in 0..2 {
             // The picture's own gain, for what is half of the data-space values.
             let factors = self.factors(eye)?;

@@ -1,52 +1,111 @@
 //! Contenders of the chart (measure.md §3): one method of ambient occlusion at one setting each, that brings its ambient
 //! values up to date after a change and says what each stage of that cost.
 //!
-//! A new method joins by one file here, its `mod` line and its line in `METHODS`: a function that lists its settings
-//! as [`Entry`]s, each of which opens a [`Contender`]. Where a [`Renderer`](crate::renderer::Renderer) does the work, `rendered` is all it takes.
+//! A new method joins by its lines in `CONTENDERS`, which has one kind of contender for each of [`cao_model::METHODS`]. Another way to
+//! have ambient values joins by one file here and its line there: a function that lists its settings as [`Entrant`]s, each of
+//! which opens a [`Contender`].
 
-mod cao;
-mod cao_literal;
 mod image_space;
-mod lao;
-mod lao_unit;
+mod listed;
+mod paper;
 mod rendered;
 mod solid;
-mod sweep;
 
 use crate::Result;
-use ::cao::renderer::StereoImage;
+use cao::renderer::StereoImage;
 use cao_gpu::{Gpu, Timings};
 use cao_model::clip::Clip;
 use cao_model::look::Look;
-use cao_model::occlusion::{Occlusion, Quadrature};
+use cao_model::methods::{Method, Samples};
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
 use cao_model::volume::Volume;
+use listed::Listed;
 
-/// Every method, in the order of the legend.
-const METHODS: [fn(&Asked) -> Vec<Entry>; 7] = [
-    solid::entries,
-    image_space::entries,
-    lao_unit::entries,
-    lao::entries,
-    cao_literal::entries,
-    cao::entries,
-    sweep::entries,
+/// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
+/// for a change, are a fifth each (method.md §5).
+static CONTENDERS: [Kind; 7] = [
+    Kind { name: SOLID, enters: Enters::By(solid::entrants) },
+    Kind { name: "image space", enters: Enters::By(image_space::entrants) },
+    Kind { name: BASELINE, enters: Enters::By(paper::unit) },
+    Kind {
+        name: "LAO",
+        enters: Enters::As(Listed {
+            method: Method::Lao,
+            computes: "voxels that show recomputed",
+            ray: 0.2,
+            few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            finer: &[],
+        }),
+    },
+    Kind { name: "CAO literal", enters: Enters::By(paper::literal) },
+    Kind {
+        name: "CAO",
+        enters: Enters::As(Listed {
+            method: Method::Cao,
+            computes: "voxels that show and changed",
+            ray: 0.2,
+            few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            finer: &[],
+        }),
+    },
+    Kind {
+        name: "sweep",
+        enters: Enters::As(Listed {
+            method: Method::Sweep,
+            computes: "bricks that show and changed",
+            ray: 0.01,
+            few: &[RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50],
+            finer: &[(RaySet::W26, 1.25), (RaySet::W50, 1.15)],
+        }),
+    },
 ];
 
-/// Name of the method that times are quoted against: the paper's naive recomputation (method.md §2).
-pub const BASELINE: &str = "LAO (unit)";
-
-/// Every contender for such a scene.
-pub fn all(asked: &Asked) -> Vec<Entry> {
-    METHODS.iter().flat_map(|entries| entries(asked)).collect()
+/// A kind of contender.
+struct Kind {
+    /// In tables, files and the legend.
+    name: &'static str,
+    enters: Enters,
 }
 
-/// Place of a method in the legend.
-pub fn place(method: &str) -> usize {
-    let asked = Asked { min_spacing: 1.0, quick: true };
-    let named = |entries: &fn(&Asked) -> Vec<Entry>| entries(&asked).iter().any(|e| e.method == method);
-    METHODS.iter().position(named).unwrap_or(METHODS.len())
+/// How its settings are found.
+enum Enters {
+    /// From a method's entry.
+    As(Listed),
+    /// By what it lists itself.
+    By(fn(&'static str, &Asked) -> Vec<Entrant>),
+}
+
+impl Kind {
+    fn entrants(&self, asked: &Asked) -> Vec<Entrant> {
+        match &self.enters {
+            Enters::As(listed) => listed.entrants(self.name, asked),
+            Enters::By(list) => list(self.name, asked),
+        }
+    }
+}
+
+/// Name of no ambient occlusion, the paper's "solid colour" (CAO §4).
+pub const SOLID: &str = "solid colour";
+
+/// Name of the contender that times are quoted against: the paper's naive recomputation (method.md §2).
+pub const BASELINE: &str = "LAO (unit)";
+
+/// Name of a method's contender.
+pub fn name(method: Method) -> &'static str {
+    let own = |kind: &&Kind| matches!(&kind.enters, Enters::As(listed) if listed.method == method);
+    CONTENDERS.iter().find(own).map_or(method.name(), |kind| kind.name)
+}
+
+/// Every contender for such a scene.
+pub fn all(asked: &Asked) -> Vec<Entrant> {
+    CONTENDERS.iter().flat_map(|kind| kind.entrants(asked)).collect()
+}
+
+/// Place of a name in the legend.
+pub fn place(name: &str) -> usize {
+    CONTENDERS.iter().position(|kind| kind.name == name).unwrap_or(CONTENDERS.len())
 }
 
 /// What settings depend on.
@@ -98,9 +157,9 @@ pub struct State {
     pub radius_mm: f32,
 }
 
-/// What contenders compete on.
+/// Where contenders compete.
 #[derive(Clone, Copy)]
-pub struct Subject<'a> {
+pub struct Arena<'a> {
     /// The device.
     pub gpu: &'a Gpu,
     /// The volume.
@@ -123,15 +182,20 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// That of rays cast from voxels.
-    pub fn rays(occlusion: &Occlusion, min_spacing: f64, details: &str) -> Self {
-        let step = occlusion.step(min_spacing);
-        let first = occlusion.first(min_spacing);
-        Self {
-            label: occlusion.rays.name().into(),
-            quadrature: Some(occlusion.quadrature),
-            details: format!("step {step} mm, first sample at {first} mm, {details}"),
-        }
+    /// That of rays.
+    fn rays(method: Method, occlusion: &Occlusion, min_spacing: f64, computes: &str) -> Self {
+        let details = match method.entry().samples {
+            Samples::Steps => {
+                let (step, first) = (occlusion.step(min_spacing), occlusion.first(min_spacing));
+                format!("step {step} mm, first sample at {first} mm, {computes}")
+            }
+            Samples::Lattice => {
+                let step = occlusion.lattice_step(min_spacing);
+                let from = occlusion.lattice_offset(min_spacing);
+                format!("samples at most {step} mm apart, from {from} mm on, {computes}")
+            }
+        };
+        Self { label: occlusion.rays.name().into(), quadrature: Some(occlusion.quadrature), details }
     }
 
     /// Label and rule, as `26w segment`.
@@ -144,8 +208,8 @@ impl Setting {
 }
 
 /// A contender before it has anything on the device.
-pub struct Entry {
-    /// Name of the method.
+pub struct Entrant {
+    /// Its kind's name.
     pub method: &'static str,
     /// Its setting.
     pub setting: Setting,
@@ -161,11 +225,11 @@ pub fn surface_look() -> Look {
 }
 
 /// What opens a contender.
-pub type Open = Box<dyn for<'a> Fn(Subject<'a>, &State) -> Result<Box<dyn Contender + 'a>>>;
+pub type Open = Box<dyn for<'a> Fn(Arena<'a>, &State) -> Result<Box<dyn Contender + 'a>>>;
 
 /// Ambient values, 0 fully occluded … 1 unobstructed.
 #[derive(Clone, Debug)]
-pub enum Ambient {
+pub enum Values {
     /// One a voxel, x fastest.
     Voxels(Vec<f32>),
     /// One a pixel of the left eye's image, rows from the top: that of the surface which [`surface_look`]'s depth shows there.
@@ -178,7 +242,7 @@ pub trait Contender {
     fn update(&mut self, change: Change, state: &State) -> Result<Timings>;
 
     /// The values, as of the last update.
-    fn ambient(&self) -> Result<Ambient>;
+    fn ambient(&self) -> Result<Values>;
 
     /// Both eyes as the method shows them, and the time that drawing them took, by stage.
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)>;
@@ -187,31 +251,60 @@ pub trait Contender {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cao_model::METHODS;
 
-    fn entries(quick: bool) -> Vec<Entry> {
+    fn entrants(quick: bool) -> Vec<Entrant> {
         all(&Asked { min_spacing: 1.0, quick })
     }
 
     #[test]
-    fn every_method_has_its_settings_and_no_two_are_the_same() {
-        for quick in [true, false] {
-            let entries = entries(quick);
-            for (i, a) in entries.iter().enumerate() {
-                for b in &entries[..i] {
+    fn every_method_has_one_contender() {
+        let listed: Vec<&Listed> = CONTENDERS
+            .iter()
+            .filter_map(|kind| match &kind.enters {
+                Enters::As(listed) => Some(listed),
+                Enters::By(_) => None,
+            })
+            .collect();
+        for entry in METHODS {
+            let own: Vec<_> = listed.iter().filter(|listed| listed.method == entry.method).collect();
+            assert_eq!(own.len(), 1, "{}", entry.name);
+            let tried = own[0].few.iter().chain(own[0].finer.iter().map(|(set, _)| set));
+            assert!(tried.clone().all(|set| entry.sets.contains(set)), "{}", entry.name);
+        }
+        assert_eq!(listed.len(), METHODS.len());
+    }
+
+    /// Files of earlier runs have them.
+    #[test]
+    fn names_stay() {
+        let names = CONTENDERS.each_ref().map(|kind| kind.name);
+        assert_eq!(
+            names,
+            ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "sweep"]
+        );
+        assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "sweep"]);
+        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn every_kind_has_its_settings_and_no_two_are_the_same() {
+        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 4]), (false, [1, 3, 4, 21, 4, 21, 6])] {
+            let entrants = entrants(quick);
+            for (i, a) in entrants.iter().enumerate() {
+                for b in &entrants[..i] {
                     assert!((a.method, &a.setting) != (b.method, &b.setting), "{} {:?}", a.method, a.setting);
                 }
             }
-            let mut methods: Vec<_> = entries.iter().map(|e| e.method).collect();
-            methods.dedup();
-            assert_eq!(methods.len(), METHODS.len(), "{methods:?}: one run of settings a method");
+            let of = |kind: &Kind| entrants.iter().filter(|e| e.method == kind.name).count();
+            assert_eq!(CONTENDERS.each_ref().map(of), counts, "quick: {quick}");
         }
-        assert!(entries(true).len() < entries(false).len());
     }
 
     #[test]
     fn the_baseline_is_there_with_the_papers_26_rays() {
         for quick in [true, false] {
-            let found = entries(quick);
+            let found = entrants(quick);
             let baseline = found.iter().filter(|e| e.method == BASELINE && e.setting.label == "26");
             assert_eq!(baseline.count(), 1);
         }

@@ -1,38 +1,37 @@
 //! Contenders whose ambient values a [`Renderer`] computes: one setup, whose radius is the state's.
 
-use super::{Ambient, Change, Contender, Entry, Setting, State, Subject};
+use super::{Arena, Change, Contender, Entrant, Setting, State, Values};
 use crate::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao::stages;
 use cao_gpu::Timings;
 use cao_model::look::Look;
-use cao_model::methods::Method;
 use cao_model::settings::Setup;
 
-/// A method at the setting that `setup` and `details` say.
-pub fn entry(method: &'static str, setup: Setup, min_spacing: f64, details: &str, work: f64) -> Entry {
-    Entry {
-        method,
-        setting: Setting::rays(&setup.occlusion, min_spacing, details),
+/// One whose renderer has this setup.
+pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64) -> Entrant {
+    Entrant {
+        method: name,
+        setting,
         work,
-        open: Box::new(move |subject, state| Ok(Box::new(Rendered::open(subject, setup, state)?))),
+        open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, state)?))),
     }
 }
 
 struct Rendered<'a> {
-    subject: Subject<'a>,
+    arena: Arena<'a>,
     renderer: Renderer,
     setup: Setup,
 }
 
 impl<'a> Rendered<'a> {
-    fn open(subject: Subject<'a>, setup: Setup, state: &State) -> Result<Self> {
+    fn open(arena: Arena<'a>, setup: Setup, state: &State) -> Result<Self> {
         let setup = with_radius(setup, state.radius_mm);
-        let (transfer, volume) = (state.transfer.clone(), subject.volume);
-        let mut renderer = Renderer::new(subject.gpu, volume, transfer, setup, COLOUR)?;
+        let (transfer, volume) = (state.transfer.clone(), arena.volume);
+        let mut renderer = Renderer::new(arena.gpu, volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         renderer.update(&mut |_| ())?;
-        Ok(Self { subject, renderer, setup })
+        Ok(Self { arena, renderer, setup })
     }
 }
 
@@ -57,18 +56,18 @@ impl Contender for Rendered<'_> {
     fn update(&mut self, change: Change, state: &State) -> Result<Timings> {
         change_to(&mut self.renderer, self.setup, change, state)?;
         let mut timings = self.renderer.update(&mut |_| ())?;
-        if self.setup.method == Method::Lao {
-            // Maps of what the clips affect, which the renderer keeps ready for another method; a full computation asks for none (CAO §4).
+        if !self.setup.method.entry().contextual {
+            // Maps of what the clips affect, which the renderer keeps ready for a contextual method; a full computation asks for none (CAO §4).
             timings.0.retain(|timing| timing.stage != stages::DILATE);
         }
         Ok(timings)
     }
 
-    fn ambient(&self) -> Result<Ambient> {
-        Ok(Ambient::Voxels(self.renderer.read_ambient()?))
+    fn ambient(&self) -> Result<Values> {
+        Ok(Values::Voxels(self.renderer.read_ambient()?))
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        Ok(self.renderer.draw(self.subject.views, look, self.subject.size)?)
+        Ok(self.renderer.draw(self.arena.views, look, self.arena.size)?)
     }
 }

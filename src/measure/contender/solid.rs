@@ -1,39 +1,39 @@
 //! No ambient occlusion, the paper's "solid colour" (CAO §4): 1 everywhere, at no cost. What any method must beat.
 
 use super::rendered::{change_to, with_radius};
-use super::{Ambient, Asked, Change, Contender, Entry, Setting, State, Subject};
+use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values};
 use crate::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_gpu::Timings;
 use cao_model::look::Look;
+use cao_model::methods::Method;
 use cao_model::settings::Setup;
 
 /// The one setting.
-pub fn entries(_: &Asked) -> Vec<Entry> {
-    vec![Entry {
-        method: "solid colour",
+pub fn entrants(name: &'static str, _: &Asked) -> Vec<Entrant> {
+    vec![Entrant {
+        method: name,
         setting: Setting { label: "-".into(), quadrature: None, details: "ambient factor 1".into() },
         work: 0.0,
-        open: Box::new(|subject, state| Ok(Box::new(Solid::open(subject, state)?))),
+        open: Box::new(|arena, state| Ok(Box::new(Solid::open(arena, state)?))),
     }]
 }
 
 struct Solid<'a> {
-    subject: Subject<'a>,
+    arena: Arena<'a>,
     renderer: Renderer,
     setup: Setup,
 }
 
 impl<'a> Solid<'a> {
-    fn open(subject: Subject<'a>, state: &State) -> Result<Self> {
+    fn open(arena: Arena<'a>, state: &State) -> Result<Self> {
         // Without a neighbourhood nothing is occluded.
-        let setup =
-            with_radius(Setup::of(cao_model::methods::Method::Cao, subject.volume.min_spacing()), 0.0);
-        let (transfer, volume) = (state.transfer.clone(), subject.volume);
-        let mut renderer = Renderer::new(subject.gpu, volume, transfer, setup, COLOUR)?;
+        let setup = with_radius(Setup::of(Method::Cao, arena.volume.min_spacing()), 0.0);
+        let (transfer, volume) = (state.transfer.clone(), arena.volume);
+        let mut renderer = Renderer::new(arena.gpu, volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         renderer.update(&mut |_| ())?;
-        Ok(Self { subject, renderer, setup })
+        Ok(Self { arena, renderer, setup })
     }
 }
 
@@ -46,12 +46,12 @@ impl Contender for Solid<'_> {
         Ok(Timings::new())
     }
 
-    fn ambient(&self) -> Result<Ambient> {
-        Ok(Ambient::Voxels(vec![1.0; self.subject.volume.len()]))
+    fn ambient(&self) -> Result<Values> {
+        Ok(Values::Voxels(vec![1.0; self.arena.volume.len()]))
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
         let look = Look { occluded: false, ..*look };
-        Ok(self.renderer.draw(self.subject.views, &look, self.subject.size)?)
+        Ok(self.renderer.draw(self.arena.views, &look, self.arena.size)?)
     }
 }

@@ -13,7 +13,7 @@ use cao_twin::Grid;
 use cao_twin::cast::lao::lao_at;
 use cao_twin::measure::reference::reference;
 
-/// Values of the sweep.
+/// Values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Length of a voxel along z; along x and y it is 1 mm.
@@ -40,7 +40,7 @@ const RADIUS: f32 = 16.0;
 /// Nearest and farthest wall in mm: beyond half of the longest voxel.
 const WALLS: [f64; 2] = [5.0, 11.0];
 
-/// Runs the sweep, telling the share done.
+/// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let [mut paper, mut weighted, mut voxels, mut truth] = [const { Vec::new() }; 4];
     for (n, &ratio) in plan.ratios.iter().enumerate() {

@@ -14,7 +14,7 @@ use cao_twin::clip::clips::MeshLayers;
 use cao_twin::clip::peel::peel;
 use glam::Vec3;
 
-/// Sizes of the sweep.
+/// Sizes of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Pixels along an edge of the depth layers.
@@ -33,7 +33,7 @@ impl Plan {
     }
 }
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let peeler = Peel::new(gpu)?;
     let mut torus = TriangleMesh::torus(48, 24);

@@ -19,7 +19,7 @@ use cao_twin::measure::reference::reference;
 use cao_twin::trilinear_clamped;
 use glam::Vec3;
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -66,7 +66,7 @@ const RADIUS: f32 = 8.0;
 /// Category a of the mask.
 const CLIPPED: u8 = 0;
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let occlusion = Occlusion {
         rays: RaySet::W50,

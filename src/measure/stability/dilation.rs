@@ -14,9 +14,9 @@ use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, ClipCamera, Mode, Pose, Shape};
 use cao_model::mesh::TriangleMesh;
+use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::MapSettings;
-use cao_model::settings::Setup;
+use cao_model::settings::{MapSettings, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_twin::cast::lao::lao_at;
 use cao_twin::clip::classify::sample_positions;
@@ -25,7 +25,7 @@ use cao_twin::{Grid, each};
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -52,7 +52,7 @@ const RADIUS: f32 = 5.0;
 /// Cells along an edge of the device's own dilation maps.
 const DEVICE_CELLS: u32 = 128;
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let volume = builtin_box("engine", [plan.edge; 3], [1.0; 3])?;
     let transfer = TransferFunction::preset("auto", volume.range())?;
@@ -63,7 +63,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         offset_mm: None,
         step_mm: None,
     };
-    let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
+    let setup = Setup { occlusion, ..Setup::of(Method::Cao, 1.0) };
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;
     renderer.update(&mut |_| ())?;
     let grid = Grid { dims: volume.dims, spacing: volume.spacing };

@@ -1,8 +1,8 @@
-//! Where methods fail (measure.md §4): one sweep for each way, from the range where it holds through the one where it does
+//! Where methods fail (measure.md §4): one trial for each way, from the range where it holds through the one where it does
 //! not, ours in the same run.
 //!
-//! A sweep has a plan (sizes, values of its parameter), and finds a [`Finding`]: the curves, and one sentence that says what
-//! failed at which value, made from the numbers alone. A sweep in which nothing fails shows nothing, so that each
+//! A trial has a plan (sizes, values of its parameter), and finds a [`Finding`]: the curves, and one sentence that says what
+//! failed at which value, made from the numbers alone. A trial in which nothing fails shows nothing, so that each
 //! carries its own control: a method that is known to fail there.
 
 pub mod anisotropy;
@@ -24,7 +24,7 @@ use cao::clip::peel::Layers;
 use cao_gpu::Gpu;
 use cao_twin::clip::clips::{MeshLayers, NO_BACK, NO_FRONT};
 
-/// How long a sweep may take.
+/// How long a trial may take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// A fraction of a minute each, on two cores: the sizes that the charts are meant for.
@@ -33,7 +33,7 @@ pub enum Effort {
     Quick,
 }
 
-/// Whether a curve is ours, a method that the sweep is there to catch, or a yardstick.
+/// Whether a curve is ours, a method that the trial is there to catch, or a yardstick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// This program, as it is used.
@@ -120,12 +120,12 @@ pub struct Chart {
     pub series: Vec<Series>,
 }
 
-/// What a sweep says about ours.
+/// What a trial says about ours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ours {
     /// It does over the whole range what it claims.
     Holds,
-    /// The method itself ends here, and so does ours; the sweep shows where.
+    /// The method itself ends here, and so does ours; the trial shows where.
     Limited,
     /// It does not do what it claims.
     Fails,
@@ -147,7 +147,7 @@ impl Ours {
     }
 }
 
-/// What a sweep found.
+/// What a trial found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
     /// The curves.
@@ -156,18 +156,18 @@ pub struct Finding {
     pub sentence: String,
     /// Whether ours did.
     pub ours: Ours,
-    /// Whether the control failed, as it must: else the sweep could not have caught anything.
+    /// Whether the control failed, as it must: else the trial could not have caught anything.
     pub control_fails: bool,
     /// What was computed: sizes and settings.
     pub setting: String,
 }
 
-/// Runs a sweep, telling the share done (0 … 1). Uses the device's queue and waits for it.
+/// Runs a trial, telling the share done (0 … 1). Uses the device's queue and waits for it.
 pub type Run = fn(&Gpu, Effort, &mut dyn FnMut(f64)) -> Result<Finding>;
 
-/// A sweep by its name.
+/// A trial by its name.
 #[derive(Clone, Copy)]
-pub struct Sweep {
+pub struct Trial {
     /// On the command line.
     pub name: &'static str,
     /// What it asks.
@@ -176,66 +176,66 @@ pub struct Sweep {
     pub run: Run,
 }
 
-/// Every sweep, in the order of measure.md §4.
-pub const SWEEPS: [Sweep; 10] = [
-    Sweep {
+/// Every trial, in the order of measure.md §4.
+pub const TRIALS: [Trial; 10] = [
+    Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
         run: |gpu, effort, progress| stereo::run(gpu, &stereo::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "motion",
         title: "Does a clip that moves slowly pop, and when has a frame settled?",
         run: |gpu, effort, progress| motion::run(gpu, &motion::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "dilation",
         title: "Which dilation map leaves voxels stale?",
         run: |gpu, effort, progress| dilation::run(gpu, &dilation::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "concave",
         title: "What is cut wrongly when a concave clip has too few depth layers?",
         run: |gpu, effort, progress| concave::run(gpu, &concave::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "cut",
         title: "How wrong is the shading of a cut face?",
         run: |gpu, effort, progress| cut::run(gpu, &cut::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "radius",
         title: "How dark do inner layers become as the radius grows?",
         run: |_, effort, progress| radius::run(&radius::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "sheets",
         title: "How much occlusion of thin sheets do directions and steps miss?",
         run: |_, effort, progress| sheets::run(&sheets::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "anisotropy",
         title: "Does the shading depend on which way a scene lies on anisotropic voxels?",
         run: |_, effort, progress| anisotropy::run(&anisotropy::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "numbers",
         title: "Do extreme and impossible numbers give a defined result or a clear error?",
         run: |gpu, effort, progress| numbers::run(gpu, &numbers::Plan::of(effort), progress),
     },
-    Sweep {
+    Trial {
         name: "views",
         title: "Do odd eyes see holes, or each another picture?",
         run: |gpu, effort, progress| views::run(gpu, &views::Plan::of(effort), progress),
     },
 ];
 
-impl Sweep {
-    /// The sweep called `name`.
+impl Trial {
+    /// The trial called `name`.
     pub fn parse(name: &str) -> Result<Self> {
-        SWEEPS.into_iter().find(|sweep| sweep.name == name).ok_or_else(|| {
-            let names = SWEEPS.map(|sweep| sweep.name).join(", ");
-            crate::Error::refused("sweep", format!("\"{name}\" is none; there are {names}"))
+        TRIALS.into_iter().find(|trial| trial.name == name).ok_or_else(|| {
+            let names = TRIALS.map(|trial| trial.name).join(", ");
+            crate::Error::refused("trial", format!("\"{name}\" is none; there are {names}"))
         })
     }
 }
@@ -298,10 +298,10 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_have_names_of_their_own() {
-        for sweep in SWEEPS {
-            assert_eq!(Sweep::parse(sweep.name).unwrap().title, sweep.title);
+    fn trials_have_names_of_their_own() {
+        for trial in TRIALS {
+            assert_eq!(Trial::parse(trial.name).unwrap().title, trial.title);
         }
-        assert!(Sweep::parse("colour").is_err_and(|e| e.to_string().contains("stereo, motion")));
+        assert!(Trial::parse("colour").is_err_and(|e| e.to_string().contains("stereo, motion")));
     }
 }

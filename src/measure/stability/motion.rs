@@ -17,7 +17,7 @@ use cao_model::settings::Setup;
 use cao_twin::trilinear_clamped;
 use glam::Vec3;
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -53,7 +53,7 @@ const RESTS: usize = 12;
 /// A frame has settled when nothing is off by more than this: half a step of an 8-bit display at twice the ambient factor.
 pub const SETTLED: f64 = 0.5 / 255.0 / 2.0;
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let frames = plan.frames * plan.way + 1;
     let total = (3 * frames + MOVES + RESTS) as f64;

@@ -13,15 +13,14 @@ use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::Scope;
-use cao_model::settings::Setup;
+use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::volume::Volume;
 use cao_twin::Grid;
 use cao_twin::cast::lao::lao;
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Opacities of an even volume.
@@ -72,7 +71,7 @@ enum Outcome {
     Wrong(String),
 }
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let total = (3 * plan.opacities.len() + plan.radii.len() + 16) as f64;
     let mut done = 0.0;
@@ -197,13 +196,7 @@ fn occlusion(quadrature: Quadrature, radius_mm: f32) -> Occlusion {
 /// Renders a volume whose data values are opacities.
 fn renderer(gpu: &Gpu, volume: &Volume, occlusion: Occlusion) -> Result<Renderer> {
     let transfer = TransferFunction::new(vec![[0.0, 0.0], [1.0, 1.0]], WHITE.to_vec(), None)?;
-    let method = Method::Lao;
-    let setup = Setup {
-        occlusion,
-        scope: Scope::All,
-        method,
-        ..Setup::of(cao_model::methods::Method::Cao, volume.min_spacing())
-    };
+    let setup = Setup { occlusion, scope: Scope::All, ..Setup::of(Method::Lao, volume.min_spacing()) };
     Ok(Renderer::new(gpu, volume, transfer, setup, COLOUR)?)
 }
 

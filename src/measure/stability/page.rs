@@ -1,6 +1,6 @@
 //! A finding as files: its data as CSV, its charts as drawings, and all of them on one page of HTML that needs no other file.
 
-use super::{Chart, Finding, Ours, Quantity, Role, Series, Sweep};
+use super::{Chart, Finding, Ours, Quantity, Role, Series, Trial};
 use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, text_width};
 use std::fmt::Write as _;
 
@@ -106,29 +106,29 @@ pub fn csv(finding: &Finding) -> String {
 }
 
 /// All findings on a page of HTML; `head` says with what and on what they were computed.
-pub fn html(head: &str, findings: &[(Sweep, Finding)]) -> String {
+pub fn html(head: &str, findings: &[(Trial, Finding)]) -> String {
     let mut page = format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>Where methods fail</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
          <h1>Where methods fail, ours beside them</h1>\n<p class=\"head\">{}</p>\n<table>\n",
         escaped(head)
     );
-    for (sweep, finding) in findings {
+    for (trial, finding) in findings {
         let _ = writeln!(
             page,
             "<tr><td><a href=\"#{0}\">{0}</a></td><td class=\"{1}\">{1}</td><td>{2}</td></tr>",
-            sweep.name,
+            trial.name,
             judged(finding),
             escaped(&finding.sentence)
         );
     }
     page += "</table>\n";
-    for (sweep, finding) in findings {
+    for (trial, finding) in findings {
         let _ = writeln!(
             page,
             "<section id=\"{}\">\n<h2>{}</h2>\n<p>{}</p>",
-            sweep.name,
-            escaped(sweep.title),
+            trial.name,
+            escaped(trial.title),
             escaped(&finding.sentence)
         );
         for chart in &finding.charts {
@@ -199,14 +199,14 @@ mod tests {
 
     #[test]
     fn the_page_stands_alone_and_escapes_what_it_quotes() {
-        let sweep = Sweep::parse("stereo").unwrap();
-        let page = html("device <x>", &[(sweep, finding())]);
+        let trial = Trial::parse("stereo").unwrap();
+        let page = html("device <x>", &[(trial, finding())]);
         assert!(page.contains("a &lt; b") && page.contains("device &lt;x&gt;") && page.contains("<svg"));
         for outside in ["src=", "@import", "url(", "<script", "<link", "<?xml"] {
             assert!(!page.contains(outside), "{outside}");
         }
         let vacuous = Finding { control_fails: false, ..finding() };
-        assert!(html("", &[(sweep, vacuous)]).contains("class=\"vacuous\""));
+        assert!(html("", &[(trial, vacuous)]).contains("class=\"vacuous\""));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! An engine block cut by a plane along the voxels' own axes, which takes away what lies at larger x: what the sweeps of clip motion
+//! An engine block cut by a plane along the voxels' own axes, which takes away what lies at larger x: what the trials of clip motion
 //! and of cut faces look at.
 
 use crate::Result;
@@ -6,6 +6,7 @@ use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::methods::Method;
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -40,7 +41,7 @@ impl PlaneCut {
     pub fn new(gpu: &Gpu, edge: usize, occlusion: Occlusion, way: usize) -> Result<Self> {
         let volume = builtin_box("engine", [edge; 3], [1.0; 3])?;
         let grid = Grid { dims: volume.dims, spacing: volume.spacing };
-        let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
+        let setup = Setup { occlusion, ..Setup::of(Method::Cao, 1.0) };
         let transfer = TransferFunction::preset("auto", volume.range())?;
         let mut renderer = Renderer::new(gpu, &volume, transfer.clone(), setup, COLOUR)?;
         renderer.update(&mut |_| ())?;

@@ -2,7 +2,7 @@
 //!
 //! Nested translucent shells, each to be seen through the ones around it: a large radius gives the outer ones their shape, and
 //! buries the inner ones, whose rays all end in a shell. Feature-driven ambient occlusion (fdAO) is the answer to this; it does not exist here
-//! yet, so the sweep shows where ours, being LAO, stops being of use.
+//! yet, so the trial shows where ours, being LAO, stops being of use.
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
@@ -13,7 +13,7 @@ use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_twin::cast::lao::lao_at;
 use cao_twin::{Grid, each};
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -48,7 +48,7 @@ const OPACITY: f32 = 0.12;
 /// An inner layer whose ambient factor is below this share of the rind's has lost what sets it off: it reads as shadow.
 pub const BURIED: f64 = 0.5;
 
-/// Runs the sweep, telling the share done.
+/// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let volume = builtin_box("fruit", [plan.edge; 3], [1.0; 3])?;
     let grid = Grid { dims: volume.dims, spacing: volume.spacing };

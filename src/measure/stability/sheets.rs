@@ -13,7 +13,7 @@ use cao_twin::Grid;
 use cao_twin::cast::lao::lao_at;
 use cao_twin::measure::reference::reference;
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Thicknesses in voxels.
@@ -90,7 +90,7 @@ const PUBLISHED: [Way; 4] = [
     Way::unit(RaySet::R54, Quadrature::Left),
 ];
 
-/// Runs the sweep, telling the share done.
+/// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let ways: Vec<Way> = SETS.into_iter().chain(RULES).chain(PUBLISHED).collect();
     // missed[way][thickness][orientation]: found − truth; above 0 light comes through that does not.

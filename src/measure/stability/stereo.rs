@@ -12,6 +12,7 @@ use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::look::Look;
+use cao_model::methods::Method;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::{StereoRig, View};
@@ -19,7 +20,7 @@ use cao_model::volume::Volume;
 use cao_twin::measure::ssao::{Settings, ssao};
 use glam::{Vec2, Vec3};
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -50,11 +51,11 @@ const RADIUS: f32 = 6.0;
 /// An average adult's eyes are this far apart (mm): where the sentence quotes the curves.
 const ADULT_MM: f64 = 63.0;
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let voxel = SIZE_MM / plan.edge as f64;
     let volume = builtin_box("engine", [plan.edge; 3], [voxel; 3])?;
-    let mut setup = Setup::of(cao_model::methods::Method::Cao, voxel);
+    let mut setup = Setup::of(Method::Cao, voxel);
     setup.occlusion.radius_mm = RADIUS * voxel as f32;
     let transfer = TransferFunction::preset("auto", volume.range())?;
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;

@@ -14,6 +14,7 @@ use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
 use cao_model::look::Look;
+use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -21,7 +22,7 @@ use cao_model::view::{StereoRig, Tangents, View};
 use cao_model::volume::Volume;
 use glam::{Vec2, Vec3};
 
-/// Sizes and values of the sweep.
+/// Sizes and values of the trial.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// Voxels along an edge of the volume.
@@ -64,7 +65,7 @@ const TOUCH: f32 = 2.0;
 /// 1e-5 of a voxel, and samples at the block's edges come and go.
 pub const SAME_RAYS: f64 = 2e-3;
 
-/// Runs the sweep, telling the share done. Uses the device's queue and waits for it.
+/// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let stage = Stage::new(gpu, plan)?;
     let total = (plan.distances.len() + plan.shifts.len()) as f64;
@@ -174,7 +175,7 @@ impl Stage {
             offset_mm: None,
             step_mm: None,
         };
-        let setup = Setup { occlusion, ..Setup::of(cao_model::methods::Method::Cao, 1.0) };
+        let setup = Setup { occlusion, ..Setup::of(Method::Cao, 1.0) };
         let ready = |volume: &Volume, transfer| {
             let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR)?;
             renderer.update(&mut |_| ())?;
