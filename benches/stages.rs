@@ -19,7 +19,7 @@ const EDGE: usize = 32;
 
 /// Time of all stages of this name.
 fn of(stage: &str, timings: &Timings) -> Duration {
-    let found: Vec<f64> = timings.iter().filter(|(name, _)| name == stage).map(|(_, ms)| *ms).collect();
+    let found: Vec<f64> = timings.iter().filter(|t| t.stage.name == stage).map(|t| t.ms).collect();
     assert!(!found.is_empty(), "no stage {stage} in {timings:?}");
     // Criterion asks for more than nothing, which is what a fast device's clock may say.
     Duration::from_secs_f64(found.iter().sum::<f64>() / 1e3).max(Duration::from_nanos(1))

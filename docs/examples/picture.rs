@@ -13,7 +13,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, cao::renderer::COLOUR)?;
 
     // A ball of 20 mm is cut out of one corner. In a loop over frames: move it, update, draw.
-    let pose = Pose { translate_mm: Vec3::new(19.0, -19.0, 19.0), scale: Vec3::splat(20.0), ..Pose::default() };
+    let pose =
+        Pose { translate_mm: Vec3::new(19.0, -19.0, 19.0), scale: Vec3::splat(20.0), ..Pose::default() };
     renderer.set_clips(&[Clip { pose, ..Clip::remove(Shape::Sphere) }])?;
     renderer.update(&mut |_share_done| ())?;
 

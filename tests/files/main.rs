@@ -1,5 +1,8 @@
 //! Tests that need no device: files in and out, plain data, the kernels' compiler, the rules of the house.
 
+// What the kernels' compiler emits says `crate::gpu`.
+use cao_gpu as gpu;
+
 mod builtin;
 mod house;
 mod mesh;

@@ -1,7 +1,7 @@
 //! The shader build: every shipped shader compiles, is valid SPIR-V, and the compiler's own checks work.
 
-use cao::gpu::{self, shaders};
 use cao_compile::{self as compile, Bounds, Kernel, Options, Source, What};
+use cao_kernels as shaders;
 use cao_reflect::{Shader, Stage};
 use std::{fs, path::Path, process::Command};
 
@@ -164,11 +164,11 @@ fn reflection_says_what_each_entry_point_touches() {
 /// What the compiler emits for a few awkward kernels; its own tests hold it to that text.
 #[expect(dead_code, reason = "these tests look at a part of it")]
 mod emitted {
-    include!("../spirv/compile/tests/kernels/emitted.rs");
+    include!("../../spirv/compile/tests/kernels/emitted.rs");
 }
 
 /// The same as text.
-const EMITTED: &str = include_str!("../spirv/compile/tests/kernels/emitted.rs");
+const EMITTED: &str = include_str!("../../spirv/compile/tests/kernels/emitted.rs");
 
 /// Offsets as the WGSL specification has them, section 14.4.1.
 #[test]
@@ -218,7 +218,7 @@ fn emitted_constants_have_the_values_that_the_kernels_compute_with() {
     assert_eq!((k::MAIN_WORKGROUP, k::LIST_WORDS_WORKGROUP), ([4, 4, 2], [64, 1, 1]));
     // Of the kernels that ship: of abstract type, and computed.
     assert_eq!((shaders::sweep::CHUNK, shaders::sweep::TILE), (8, [8, 4]));
-    assert_eq!(shaders::near::ALL_CHANGED, 255 * shaders::shared::bricks::CHANGED);
+    assert_eq!(shaders::near::ALL_CHANGED, 255 * shaders::shared::todo::CHANGED);
 }
 
 /// Two kernels that include one file have its types in common.
@@ -281,7 +281,7 @@ fn a_struct_in_memory_has_every_member_and_every_gap() {
         .filter_map(|item| match &item.what {
             What::Struct(s, _) => Some((
                 s.name.as_str(),
-                s.span,
+                s.size,
                 s.fields.iter().map(|f| (f.name.as_str(), f.offset, f.size)).collect(),
             )),
             What::Constant(_) => None,

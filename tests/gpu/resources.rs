@@ -2,7 +2,9 @@
 
 use cao_gpu::Access::*;
 use cao_gpu::Error;
-use cao_gpu::{Bind, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, SamplerDesc};
+use cao_gpu::{
+    Bind, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Phase, SamplerDesc, Stage,
+};
 use cao_testing::wgsl::{bind, compile, device_buffer, read_back};
 use cao_testing::{close, open};
 
@@ -305,27 +307,29 @@ fn stages_are_timed_in_order_and_may_nest() {
     let gpu = open();
     let x = gpu.buffer("x", 1 << 20, BufferUse::Device).unwrap();
     let mut rec = gpu.recorder("test").unwrap();
+    const NAMES: [&str; 3] = ["one", "two", "three"];
+    let stage = |i: u32| Stage::new(NAMES[i as usize % 3], Phase::ALL[i as usize % 5]);
     // More stages than one query pool holds.
     for i in 0..70 {
-        rec.stage(&format!("stage {i}")).unwrap();
+        rec.stage(stage(i)).unwrap();
         rec.fill(&x, 0, x.bytes(), i).unwrap();
         rec.end_stage().unwrap();
         rec.barrier(&[TransferWrite], &[TransferWrite]);
     }
-    rec.stage("outer").unwrap();
-    rec.stage("inner").unwrap();
+    rec.stage(Stage::new("outer", Phase::Clip)).unwrap();
+    rec.stage(Stage::new("inner", Phase::Clip)).unwrap();
     rec.fill(&x, 0, x.bytes(), 7).unwrap();
     rec.end_stage().unwrap();
     rec.end_stage().unwrap();
     assert!(problem(rec.end_stage()).contains("no stage"));
     let timings = rec.submit_and_wait().unwrap();
     assert_eq!(timings.len(), 72);
-    assert_eq!(timings[69].0, "stage 69");
-    assert!(timings.iter().all(|(_, ms)| (0.0..60_000.0).contains(ms)), "{timings:?}");
-    assert!(timings[70].1 >= timings[71].1, "the outer stage contains the inner one: {timings:?}");
-    assert!(timings.iter().any(|(_, ms)| *ms > 0.0));
+    assert_eq!(timings[69].stage, stage(69));
+    assert!(timings.iter().all(|t| (0.0..60_000.0).contains(&t.ms)), "{timings:?}");
+    assert!(timings[70].ms >= timings[71].ms, "the outer stage contains the inner one: {timings:?}");
+    assert!(timings.iter().any(|t| t.ms > 0.0));
     let mut rec = gpu.recorder("open end").unwrap();
-    rec.stage("endless").unwrap();
+    rec.stage(Stage::new("endless", Phase::Clip)).unwrap();
     assert!(problem(rec.submit_and_wait()).contains("endless"));
     drop(x);
     close(gpu);

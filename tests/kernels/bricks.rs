@@ -1,8 +1,8 @@
 //! The kernel `bricks` against its twin and against plain loops.
 
-use cao::cast::volumes::volume_image;
 use cao::field::Field;
 use cao::field::bricks::{BrickList, Bricks, Which};
+use cao::host::volume_image;
 use cao_gpu::{Access, Gpu};
 use cao_measure::random::Random;
 use cao_testing::*;

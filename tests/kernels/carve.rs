@@ -1,7 +1,6 @@
 //! The kernel `carve` against `classify`, which is held to its twin, and against its own: opacity in place, where it lies, what
 //! changed.
 
-use cao::cast::volumes::volume_image;
 use cao::clip::classify::Classify;
 use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
@@ -12,6 +11,7 @@ use cao::field::bricks::BrickList;
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
+use cao::host::volume_image;
 use cao::sweep::carve::{Bindings, Carve};
 use cao::sweep::near::{CHANGED, FAR};
 use cao::sweep::past::PastBricks;

@@ -1,13 +1,13 @@
 //! The kernel `clip_bricks`: what it says of a brick holds for every sample of its voxels, by its twin, and the
 //! classification that trusts it is the same, bit for bit, as one that looks at every sample.
 
-use cao::cast::volumes::volume_image;
 use cao::clip::classify::Classify;
 use cao::clip::clip_bricks::{ClipBricks, UNKNOWN};
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
 use cao::field::Field;
+use cao::host::volume_image;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::exactness;

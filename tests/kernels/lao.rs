@@ -1,8 +1,12 @@
 //! The kernel `lao` against its twin: CAO eq. (2) and (3) and the two better rules, every ray set.
 
-use cao::cast::full as lao;
-use cao::cast::volumes::{Kernels, Settings, Volumes, volume_image};
+use cao::cast::lao::{Bindings, Work};
+use cao::cast::volumes::{Kernels, Volumes};
+use cao::drive::{self, Part};
 use cao::field::Field;
+use cao::field::bricks::{BrickList, Which};
+use cao::host::volume_image;
+use cao::stages::{BRICKS, LAO};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -32,6 +36,13 @@ fn tolerance(gpu: &Gpu, grid: &Grid, occlusion: &Occlusion, reference_mm: f64, l
     samples.sqrt() * steepness.max(1.0) * sample + FUNCTIONS
 }
 
+#[derive(Clone, Copy)]
+struct Settings {
+    occlusion: Occlusion,
+    scope: Scope,
+    reference_mm: f32,
+}
+
 struct Bench<'a> {
     gpu: &'a Gpu,
     kernels: &'a Kernels,
@@ -45,27 +56,62 @@ impl<'a> Bench<'a> {
         Self { gpu, kernels, volumes: Volumes::new(gpu, &field).unwrap(), field }
     }
 
+    /// The bricks in scope, then their rays, from `opacity` into `out`.
+    fn parts<'b>(&'b self, opacity: &'b Image, out: &'b Image, settings: &'b Settings) -> [Part<'b>; 2] {
+        let (field, k, v) = (&self.field, self.kernels, &self.volumes);
+        let Settings { occlusion, scope, reference_mm } = settings;
+        let (mask, precomputed) = (&v.mask, &v.full_opacity);
+        let b = Bindings { opacity, list: &v.list, mask, precomputed, ambient: out };
+        let listed = Part::short(BRICKS, move |rec| {
+            rec.clear_image(out, [1.0; 4])?;
+            rec.barrier(&[Access::TransferWrite], &[Access::StorageWrite]);
+            let which = if *scope == Scope::All { Which::All } else { Which::Needed };
+            Ok(k.bricks.record(rec, field, which, opacity, mask, &v.changed_before, &v.list)?)
+        });
+        // So few at first that there are several parts.
+        let rays = Part::items(LAO, (&v.list.buffer, BrickList::COUNT_AT), 5, move |rec, items| {
+            match items {
+                None => k.lao.record(rec, field, occlusion, *reference_mm, *scope, Work::Full, b)?,
+                Some(items) => {
+                    let (base, count) = (items.start, items.len() as u32);
+                    k.lao.record_part(
+                        rec,
+                        field,
+                        occlusion,
+                        *reference_mm,
+                        *scope,
+                        Work::Full,
+                        b,
+                        base,
+                        count,
+                    )?;
+                }
+            }
+            Ok(())
+        });
+        [listed, rays]
+    }
+
     /// In parts, on the device's own queue.
     fn run(&self, opacity: &Image, settings: &Settings) -> Vec<f32> {
         let out = self.out();
         run(self.gpu, |rec| self.kernels.lao.record_rays(rec, &settings.occlusion).unwrap());
         let mut last = 0.0;
-        let (field, kernels, volumes) = (&self.field, self.kernels, &self.volumes);
-        lao::run(self.gpu, field, kernels, volumes, settings, opacity, &out, &mut |part| {
-            assert!(part > last && part <= 1.0);
+        drive::run(self.gpu, &self.parts(opacity, &out, settings), &mut |part| {
+            assert!(part >= last && part <= 1.0);
             last = part;
         })
         .unwrap();
+        assert_eq!(last, 1.0);
         read_floats(self.gpu, &out)
     }
 
     /// By one indirect dispatch.
     fn record(&self, opacity: &Image, settings: &Settings) -> Vec<f32> {
         let out = self.out();
-        let (field, kernels, volumes) = (&self.field, self.kernels, &self.volumes);
         run(self.gpu, |rec| {
-            kernels.lao.record_rays(rec, &settings.occlusion).unwrap();
-            lao::record(rec, field, kernels, volumes, settings, opacity, &out).unwrap();
+            self.kernels.lao.record_rays(rec, &settings.occlusion).unwrap();
+            drive::record(rec, &self.parts(opacity, &out, settings)).unwrap();
         });
         read_floats(self.gpu, &out)
     }

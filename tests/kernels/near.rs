@@ -52,7 +52,7 @@ fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
                 other: &other,
                 contact: &contact,
                 todo: &todo,
-                count: &count,
+                chosen: &count,
                 solid: &solid,
                 valued: &valued,
                 past: &past,

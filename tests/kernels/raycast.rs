@@ -429,6 +429,7 @@ fn views_that_do_not_fit_are_refused_by_name() {
 struct Stages {
     field: Field,
     volumes: Volumes,
+    occupancy: Buffer,
     transfer: TransferBuffer,
     clips: ClipSet,
     frame: FrameBuffer,
@@ -441,6 +442,9 @@ impl Stages {
         let field = Field::upload(gpu, volume).unwrap();
         let stages = Self {
             volumes: Volumes::new(gpu, &field).unwrap(),
+            occupancy: gpu
+                .buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device)
+                .unwrap(),
             transfer: TransferBuffer::new(gpu).unwrap(),
             clips: ClipSet::new(gpu).unwrap(),
             frame: FrameBuffer::new(gpu).unwrap(),
@@ -460,11 +464,11 @@ impl Stages {
             stages.clips.record(rec, clips, 50.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
             opacity.record(rec, &stages.field, &stages.transfer, &volumes.full_opacity).unwrap();
-            occupancy.record(rec, &stages.field, &stages.transfer, &volumes.occupancy).unwrap();
+            occupancy.record(rec, &stages.field, &stages.transfer, &stages.occupancy).unwrap();
             clip_bricks.record(rec, &stages.field, &stages.clips, 2.0, &volumes.clip_bricks).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
             distance
-                .record(rec, &stages.field, &volumes.occupancy, &volumes.clip_bricks, &stages.distances)
+                .record(rec, &stages.field, &stages.occupancy, &volumes.clip_bricks, &stages.distances)
                 .unwrap();
         });
         stages

@@ -4,7 +4,7 @@ use ash::vk;
 use cao::renderer::Renderer;
 use cao_gpu::Access::*;
 use cao_gpu::Error;
-use cao_gpu::{Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, ValidationLog};
+use cao_gpu::{Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase, Stage, ValidationLog};
 use cao_model::clip::{Clip, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
@@ -14,6 +14,9 @@ use cao_model::view::StereoRig;
 use cao_testing::wgsl::{bind, compile};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
+
+const FIRST: Stage = Stage::new("first", Phase::Ambient);
+const SECOND: Stage = Stage::new("second", Phase::Draw);
 
 /// What the validation layer said to the host.
 static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
@@ -153,7 +156,7 @@ fn a_host_keeps_its_handles_and_its_queue() {
     let commands = [host.begin(), host.begin()];
     // SAFETY: the command buffer is recording and submitted once below; the `Recorded` is kept until then.
     let mut rec = unsafe { gpu.record_into(commands[0]) };
-    rec.stage("first").unwrap();
+    rec.stage(FIRST).unwrap();
     rec.fill(&x, 0, 4 * 13, 100).unwrap();
     rec.barrier(&[TransferWrite], &[StorageRead, StorageWrite]);
     rec.dispatch_over(&pipeline, &[bind("b", &x)], &5u32.to_ne_bytes(), [13, 1, 1]).unwrap();
@@ -161,7 +164,7 @@ fn a_host_keeps_its_handles_and_its_queue() {
     let first = rec.finish().unwrap();
     // SAFETY: as above.
     let mut rec = unsafe { gpu.record_into(commands[1]) };
-    rec.stage("second").unwrap();
+    rec.stage(SECOND).unwrap();
     let copy = |rec: &mut cao_gpu::Recorder| rec.copy_buffer(&x, 0, &back, 0, 4 * 13);
     assert!(matches!(copy(&mut rec), Err(Error::Hazard { problem }) if problem.contains("test.main")));
     rec.barrier(&[StorageWrite], &[TransferRead]);
@@ -171,9 +174,9 @@ fn a_host_keeps_its_handles_and_its_queue() {
     let second = rec.finish().unwrap();
 
     host.submit_and_wait(&commands);
-    for (recorded, name) in [(&first, "first"), (&second, "second")] {
+    for (recorded, stage) in [(&first, FIRST), (&second, SECOND)] {
         let timings = recorded.timings().unwrap().expect("the host has waited");
-        assert_eq!((timings.len(), timings[0].0.as_str()), (1, name));
+        assert_eq!((timings.len(), timings[0].stage), (1, stage));
     }
     let numbers: Vec<u32> = bytemuck::pod_collect_to_vec(&back.read(0, back.bytes()).unwrap());
     assert_eq!(numbers, (105..118).collect::<Vec<_>>());
@@ -242,7 +245,7 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
     let recorded = rec.finish().unwrap();
     host.submit_and_wait(&[cmd]);
     let stages = recorded.timings().unwrap().expect("the host has waited");
-    assert!(stages.iter().any(|(name, _)| name == "raycast"), "{stages:?}");
+    assert!(stages.iter().any(|t| t.stage.name == "raycast"), "{stages:?}");
 
     let own_gpu = cao_testing::open();
     let mut own = renderer(&own_gpu);

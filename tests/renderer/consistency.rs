@@ -99,7 +99,9 @@ fn eyes_read_the_volumes_own_ambient_factor_and_transmittance() {
     let views = eyes(&volume, 30.0);
     let half = 0.5 * size_mm(&grid);
     let mut compared = 0;
-    for (n, seen) in renderer.seen_by_both(&views, &Look::default(), &points).unwrap().iter().enumerate() {
+    for (n, seen) in
+        cao::verify::seen_by_both(&renderer, &views, &Look::default(), &points).unwrap().iter().enumerate()
+    {
         for (view, seen) in views.iter().zip(seen) {
             if seen.transmittance < 0.0 {
                 continue;
@@ -162,7 +164,8 @@ fn between_voxels_both_eyes_read_the_same_but_at_the_snaps_own_borders() {
     let (mut both, mut different) = (0, 0);
     for azimuth in [20.0, 60.0, 200.0] {
         let views = eyes(&volume, azimuth);
-        for [left, right] in renderer.seen_by_both(&views, &Look::default(), &points).unwrap() {
+        for [left, right] in cao::verify::seen_by_both(&renderer, &views, &Look::default(), &points).unwrap()
+        {
             if left.transmittance >= 0.3 && right.transmittance >= 0.3 {
                 both += 1;
                 let off = (left.ambient - right.ambient).abs();
@@ -232,7 +235,7 @@ fn image_space_occlusion_fails_the_check_that_data_space_passes() {
         let (points, pixels): (Vec<Vec3>, Vec<[usize; 2]>) = candidates.unzip();
         assert!(points.len() > 500, "{name}: {} points", points.len());
 
-        let seen = renderer.seen_by_both(&views, &look, &points).unwrap();
+        let seen = cao::verify::seen_by_both(&renderer, &views, &look, &points).unwrap();
         let data_space: Vec<_> = seen.iter().map(|eyes| eyes.map(|eye| eye.ambient)).collect();
         assert_eq!(mismatches(&data_space), 0, "{name}");
         // Not because all is alike.

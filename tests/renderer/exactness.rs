@@ -43,7 +43,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, setup: Setup) -> Renderer {
 /// Updates and compares with a full recomputation.
 fn verify(renderer: &mut Renderer) -> Difference {
     renderer.update(&mut |_| ()).unwrap();
-    renderer.verify(&mut |_| ()).unwrap().0
+    cao::verify::verify(renderer, &mut |_| ()).unwrap().0
 }
 
 fn add(sum: &mut Difference, one: Difference) {

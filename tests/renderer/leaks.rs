@@ -52,9 +52,9 @@ fn work(renderer: &mut Renderer, volume: &Volume) {
     {
         renderer.set_clips(&clips).unwrap();
         renderer.update(&mut |_| ()).unwrap();
-        assert_eq!(renderer.verify(&mut |_| ()).unwrap().0.different, 0);
+        assert_eq!(cao::verify::verify(renderer, &mut |_| ()).unwrap().0.different, 0);
         renderer.draw(&views, &Look::default(), [33, 21]).unwrap();
-        renderer.seen_by_both(&views, &Look::default(), &[Vec3::ZERO]).unwrap();
+        cao::verify::seen_by_both(renderer, &views, &Look::default(), &[Vec3::ZERO]).unwrap();
         renderer.read_ambient().unwrap();
         renderer.categories().unwrap();
     }

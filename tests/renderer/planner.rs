@@ -2,6 +2,7 @@
 //! it foresaw.
 
 use cao::renderer::{COLOUR, Renderer};
+use cao::stages;
 use cao::{Clip, Gpu, Pose, Shape};
 use cao_measure::planner::{
     Budget, Calibration, Candidate, Measured, SAMPLES, TIME_FACTOR, calibrate, candidates, measure,
@@ -85,7 +86,7 @@ fn taken(renderer: &mut Renderer, candidate: Candidate) -> f64 {
         .map(|_| {
             renderer.invalidate();
             let timings = renderer.update(&mut |_| ()).unwrap();
-            timings.iter().filter(|(stage, _)| stage == "lao" || stage == "sweep").map(|(_, ms)| ms).sum()
+            timings.iter().filter(|t| [stages::LAO, stages::SWEEP].contains(&t.stage)).map(|t| t.ms).sum()
         })
         .collect();
     times.sort_by(f64::total_cmp);

@@ -60,7 +60,7 @@ fn exact_and_visible(name: &str, preset: &str) {
     let found = renderer.categories().unwrap();
     assert!(found.clipped > 0 && found.affected > 0 && found.untouched > 0, "{found:?}");
 
-    let (difference, _) = renderer.verify(&mut |_| ()).unwrap();
+    let (difference, _) = cao::verify::verify(&renderer, &mut |_| ()).unwrap();
     assert_eq!(difference.different, 0, "{difference:?}");
     assert!(difference.compared > 0, "{difference:?}");
 

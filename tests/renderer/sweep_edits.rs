@@ -194,7 +194,7 @@ fn updates_equal_a_full_sweep_after_any_sequence_of_edits() {
                 run(&gpu, |rec| renderer.record_update(rec).unwrap());
             }
             renderer.update(&mut |_| ()).unwrap();
-            let (found, _) = renderer.verify(&mut |_| ()).unwrap();
+            let (found, _) = cao::verify::verify(&renderer, &mut |_| ()).unwrap();
             let context = || {
                 format!(
                     "{name} {:?} {:?} seed {seed} step {step}: after {}",
@@ -260,7 +260,7 @@ fn a_frame_in_which_nothing_changed_costs_nothing() {
     scene.clips =
         vec![random_clip(&mut random, &cao_model::clip::Shape::Sphere, size_mm(&grid_of(&scene.volume)))];
     let mut renderer = scene.renderer(&gpu);
-    assert_eq!(renderer.update(&mut |_| ()).unwrap(), []);
+    assert_eq!(*renderer.update(&mut |_| ()).unwrap(), []);
     renderer.set_clips(&scene.clips).unwrap();
     assert!(!renderer.update(&mut |_| ()).unwrap().is_empty());
     assert_eq!(renderer.categories().unwrap().affected, 0);

@@ -5,8 +5,8 @@
 
 pub mod wgsl;
 
-use cao::cast::volumes::volume_image;
 use cao::field::Field;
+use cao::host::volume_image;
 use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
