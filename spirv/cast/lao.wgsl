@@ -31,7 +31,7 @@ struct Rays {
 
 #include "shared/bricks.wgsl"
 #include "shared/categories.wgsl"
-#include "shared/rays.wgsl"
+#include "shared/ray_set.wgsl"
 #include "shared/segment.wgsl"
 
 // Of the listed voxels, the mask decides which are computed.

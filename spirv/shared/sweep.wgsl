@@ -4,7 +4,7 @@
 // begins at. Its step i is at voxel (u + i du, w + i dw, r + i |da|), the first two modulo the volume; walked from the upper
 // end where da < 0.
 
-#include "shared/rays.wgsl"
+#include "shared/ray_set.wgsl"
 
 // Lines of a tile along the faster axis across the walk and along the other: eight lie side by side in memory.
 const TILE = vec2(8u, 4u);
