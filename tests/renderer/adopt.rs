@@ -7,10 +7,10 @@ use cao_gpu::Error;
 use cao_gpu::{Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase, Stage, ValidationLog};
 use cao_model::clip::{Clip, Shape};
 use cao_model::look::Look;
-use cao_model::methods::Method;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
+use cao_testing::methods;
 use cao_testing::wgsl::{bind, compile};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -213,48 +213,51 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
     let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
     let volume = cao_formats::open("builtin:fruit:16").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let setup = Setup::of(Method::Cao, volume.min_spacing());
-    let clips = [Clip::remove(Shape::Torus)];
-    let renderer = |gpu: &Gpu| {
-        let mut renderer = Renderer::new(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
-        renderer.set_clips(&clips).unwrap();
-        renderer
-    };
-    let mut hosted = renderer(&gpu);
-    let target = |format| {
-        let desc = ImageDesc {
-            dims: [16, 16, 1],
-            layers: 2,
-            format,
-            kind: ImageKind::D2,
-            usage: ImageUse::ATTACHMENT,
+    for method in methods() {
+        let setup = Setup::of(method, volume.min_spacing());
+        let clips = [Clip::remove(Shape::Torus)];
+        let renderer = |gpu: &Gpu| {
+            let mut renderer =
+                Renderer::new(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
+            renderer.set_clips(&clips).unwrap();
+            renderer
         };
-        gpu.image("swapchain", &desc).unwrap()
-    };
-    let (colour, depth) = (target(Format::Rgba16Float), target(Format::D32Float));
-    let views = StereoRig::framing(volume.size_mm(), 30.0, 20.0).views(1.0, 1.0, 500.0).unwrap();
+        let mut hosted = renderer(&gpu);
+        let target = |format| {
+            let desc = ImageDesc {
+                dims: [16, 16, 1],
+                layers: 2,
+                format,
+                kind: ImageKind::D2,
+                usage: ImageUse::ATTACHMENT,
+            };
+            gpu.image("swapchain", &desc).unwrap()
+        };
+        let (colour, depth) = (target(Format::Rgba16Float), target(Format::D32Float));
+        let views = StereoRig::framing(volume.size_mm(), 30.0, 20.0).views(1.0, 1.0, 500.0).unwrap();
 
-    let cmd = host.begin();
-    // SAFETY: the command buffer is recording and submitted once below; the `Recorded` is kept until then.
-    let mut rec = unsafe { gpu.record_into(cmd) };
-    hosted.record_update(&mut rec).unwrap();
-    rec.discard(&colour);
-    rec.discard(&depth);
-    rec.barrier(&[], &[AttachmentWrite]);
-    hosted.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, [16, 16]).unwrap();
-    let recorded = rec.finish().unwrap();
-    host.submit_and_wait(&[cmd]);
-    let stages = recorded.timings().unwrap().expect("the host has waited");
-    assert!(stages.iter().any(|t| t.stage.name == "raycast"), "{stages:?}");
+        let cmd = host.begin();
+        // SAFETY: the command buffer is recording and submitted once below; the `Recorded` is kept until then.
+        let mut rec = unsafe { gpu.record_into(cmd) };
+        hosted.record_update(&mut rec).unwrap();
+        rec.discard(&colour);
+        rec.discard(&depth);
+        rec.barrier(&[], &[AttachmentWrite]);
+        hosted.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, [16, 16]).unwrap();
+        let recorded = rec.finish().unwrap();
+        host.submit_and_wait(&[cmd]);
+        let stages = recorded.timings().unwrap().expect("the host has waited");
+        assert!(stages.iter().any(|t| t.stage.name == "raycast"), "{stages:?}");
 
-    let own_gpu = cao_testing::open();
-    let mut own = renderer(&own_gpu);
-    own.update(&mut |_| ()).unwrap();
-    let bits = |r: &Renderer| r.read_ambient().unwrap().into_iter().map(f32::to_bits).collect::<Vec<_>>();
-    assert_eq!(bits(&hosted), bits(&own));
+        let own_gpu = cao_testing::open();
+        let mut own = renderer(&own_gpu);
+        own.update(&mut |_| ()).unwrap();
+        let bits = |r: &Renderer| r.read_ambient().unwrap().into_iter().map(f32::to_bits).collect::<Vec<_>>();
+        assert_eq!(bits(&hosted), bits(&own));
 
-    drop((own, hosted, colour, depth, recorded));
-    cao_testing::close(own_gpu);
+        drop((own, hosted, colour, depth, recorded));
+        cao_testing::close(own_gpu);
+    }
     assert_eq!(gpu.memory_report(), []);
     drop(gpu);
     host.destroy();

@@ -10,7 +10,7 @@ use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
-use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -23,16 +23,16 @@ use cao_twin::measure::ssao::{Settings, ssao};
 use cao_twin::trilinear;
 use glam::Vec3;
 
-fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet) -> Renderer {
+fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet, method: Method) -> Renderer {
     let setup = Setup {
         occlusion: Occlusion {
             rays,
-            quadrature: Quadrature::Left,
+            quadrature: method.quadrature(),
             radius_mm: 5.0 * volume.min_spacing() as f32,
             offset_mm: None,
             step_mm: None,
         },
-        method: Method::Cao,
+        method,
         scope: Scope::Needed,
         anti_aliasing: AntiAliasing::N32,
         maps: MapSettings { resolution: 128, cells: 64, pairs: 4, literal: false },
@@ -55,20 +55,22 @@ fn both_eyes_read_identical_bits_wherever_both_see() {
     .enumerate()
     {
         let volume = builtin_box(name, dims, spacing).unwrap();
-        let mut renderer = renderer(&gpu, &volume, [RaySet::R14, RaySet::W14][n % 2]);
-        let mut random = Random::new(SEED);
-        let mut points = 0;
-        for turn in 0..4 {
-            let shape = [Shape::Sphere, Shape::Plane, Shape::Mesh(concave())][turn % 3].clone();
-            let clip = exactness::random_clip(&mut random, &renderer, &shape, turn as u32 % 2);
-            let clip = Clip { mode: Mode::Remove, ..clip };
-            renderer.set_clips(if turn == 0 { &[] } else { std::slice::from_ref(&clip) }).unwrap();
-            renderer.update(&mut |_| ()).unwrap();
-            let seen = compare_eyes(&renderer, &mut random).unwrap();
-            assert_eq!(seen.different, 0, "{name} seed {SEED} turn {turn} {clip:?}: {seen:?}");
-            points += seen.points;
+        for method in methods() {
+            let mut renderer = renderer(&gpu, &volume, [RaySet::R14, RaySet::W14][n % 2], method);
+            let mut random = Random::new(SEED);
+            let mut points = 0;
+            for turn in 0..4 {
+                let shape = [Shape::Sphere, Shape::Plane, Shape::Mesh(concave())][turn % 3].clone();
+                let clip = exactness::random_clip(&mut random, &renderer, &shape, turn as u32 % 2);
+                let clip = Clip { mode: Mode::Remove, ..clip };
+                renderer.set_clips(if turn == 0 { &[] } else { std::slice::from_ref(&clip) }).unwrap();
+                renderer.update(&mut |_| ()).unwrap();
+                let seen = compare_eyes(&renderer, &mut random).unwrap();
+                assert_eq!(seen.different, 0, "{name} seed {SEED} turn {turn} {clip:?}: {seen:?}");
+                points += seen.points;
+            }
+            assert!(points > 500, "{name}: only {points} points were seen by both eyes");
         }
-        assert!(points > 500, "{name}: only {points} points were seen by both eyes");
     }
     close(gpu);
 }
@@ -85,7 +87,7 @@ fn eyes_read_the_volumes_own_ambient_factor_and_transmittance() {
     let gpu = open();
     let volume = builtin_box("fruit", [36, 30, 32], [1.0, 0.8, 1.2]).unwrap();
     let grid = grid_of(&volume);
-    let mut renderer = renderer(&gpu, &volume, RaySet::R14);
+    let mut renderer = renderer(&gpu, &volume, RaySet::R14, Method::default());
     renderer.update(&mut |_| ()).unwrap();
     let (ambient, opacity) = (renderer.read_ambient().unwrap(), renderer.read_opacity().unwrap());
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
@@ -153,7 +155,7 @@ fn between_voxels_both_eyes_read_the_same_but_at_the_snaps_own_borders() {
 
     let gpu = open();
     let volume = builtin_box("fruit", [36, 30, 32], [1.0; 3]).unwrap();
-    let mut renderer = renderer(&gpu, &volume, RaySet::R14);
+    let mut renderer = renderer(&gpu, &volume, RaySet::R14, Method::default());
     let pose = Pose { translate_mm: Vec3::new(6.0, -9.0, 6.0), scale: Vec3::splat(11.0), ..Pose::default() };
     renderer.set_clips(&[Clip { shape: Shape::Sphere, mode: Mode::Remove, pose }]).unwrap();
     renderer.update(&mut |_| ()).unwrap();
@@ -200,7 +202,7 @@ fn image_space_occlusion_fails_the_check_that_data_space_passes() {
     for (name, azimuth) in [("engine", 30.0), ("fruit", 80.0)] {
         let volume = builtin_box(name, [40, 40, 40], [1.0; 3]).unwrap();
         let grid = grid_of(&volume);
-        let mut renderer = renderer(&gpu, &volume, RaySet::R26);
+        let mut renderer = renderer(&gpu, &volume, RaySet::R26, Method::default());
         let pose =
             Pose { translate_mm: Vec3::new(9.0, -12.0, 9.0), scale: Vec3::splat(12.0), ..Pose::default() };
         renderer.set_clips(&[Clip { shape: Shape::Sphere, mode: Mode::Remove, pose }]).unwrap();

@@ -7,7 +7,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::Method;
-use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -19,16 +19,16 @@ use cao_testing::*;
 use glam::Vec3;
 use std::sync::Arc;
 
-fn renderer(gpu: &Gpu, volume: &Volume) -> Renderer {
+fn renderer(gpu: &Gpu, volume: &Volume, method: Method) -> Renderer {
     let setup = Setup {
         occlusion: Occlusion {
             rays: RaySet::R6,
-            quadrature: Quadrature::Left,
+            quadrature: method.quadrature(),
             radius_mm: 3.0,
             offset_mm: None,
             step_mm: None,
         },
-        method: Method::Cao,
+        method,
         scope: Scope::Needed,
         anti_aliasing: AntiAliasing::N8,
         maps: MapSettings { resolution: 64, cells: 32, pairs: 2, literal: false },
@@ -65,8 +65,8 @@ fn nothing_is_left_after_a_renderer_and_its_work() {
     let gpu = open();
     assert_eq!(gpu.memory_report(), []);
     let volume = builtin_box("engine", [20, 18, 22], [1.0; 3]).unwrap();
-    for _ in 0..2 {
-        let mut one = renderer(&gpu, &volume);
+    for method in methods().flat_map(|method| [method; 2]) {
+        let mut one = renderer(&gpu, &volume, method);
         work(&mut one, &volume);
         assert!(!gpu.memory_report().is_empty());
         drop(one);
@@ -89,19 +89,21 @@ fn repeated_work_takes_no_more_memory() {
 
     let gpu = open();
     let volume = builtin_box("engine", [20, 18, 22], [1.0; 3]).unwrap();
-    let mut one = renderer(&gpu, &volume);
-    // Twice: maps of clip meshes stay until others replace them.
-    work(&mut one, &volume);
-    work(&mut one, &volume);
-    let ((names, bytes), peak) = (summary(&gpu), gpu.memory_peak());
-    for _ in 0..3 {
+    for method in methods() {
+        let mut one = renderer(&gpu, &volume, method);
+        // Twice: maps of clip meshes stay until others replace them.
         work(&mut one, &volume);
-        let (names_now, bytes_now) = summary(&gpu);
-        assert_eq!(names_now, names);
-        assert!(bytes_now <= bytes + ALIGNMENT, "{bytes} grew to {bytes_now}");
-        assert!(gpu.memory_peak() <= peak + ALIGNMENT, "{peak} grew to {}", gpu.memory_peak());
+        work(&mut one, &volume);
+        let ((names, bytes), peak) = (summary(&gpu), gpu.memory_peak());
+        for _ in 0..3 {
+            work(&mut one, &volume);
+            let (names_now, bytes_now) = summary(&gpu);
+            assert_eq!(names_now, names);
+            assert!(bytes_now <= bytes + ALIGNMENT, "{bytes} grew to {bytes_now}");
+            assert!(gpu.memory_peak() <= peak + ALIGNMENT, "{peak} grew to {}", gpu.memory_peak());
+        }
+        drop(one);
     }
-    drop(one);
     close(gpu);
 }
 
@@ -109,38 +111,40 @@ fn repeated_work_takes_no_more_memory() {
 fn failures_in_the_middle_leave_nothing_behind() {
     let gpu = open();
     let volume = builtin_box("engine", [20, 18, 22], [1.0; 3]).unwrap();
-    let mut one = renderer(&gpu, &volume);
-    one.set_clips(&[mesh(convex(), 5.0)]).unwrap();
-    one.update(&mut |_| ()).unwrap();
-    let (before, _) = summary(&gpu);
+    for method in methods() {
+        let mut one = renderer(&gpu, &volume, method);
+        one.set_clips(&[mesh(convex(), 5.0)]).unwrap();
+        one.update(&mut |_| ()).unwrap();
+        let (before, _) = summary(&gpu);
 
-    let mut open_mesh = TriangleMesh::cuboid();
-    open_mesh.triangles.pop();
-    for bad in [
-        // After the first mesh's layers were drawn.
-        vec![mesh(convex(), 6.0), mesh(Arc::new(open_mesh), 3.0)],
-        // Three pairs where two are allowed.
-        vec![mesh(Arc::new(row_of_boxes(3)), 3.0)],
-        vec![Clip::remove(Shape::Sphere); Clip::MAX + 1],
-        vec![mesh(convex(), f32::NAN)],
-    ] {
-        one.set_clips(&bad).unwrap_err();
+        let mut open_mesh = TriangleMesh::cuboid();
+        open_mesh.triangles.pop();
+        for bad in [
+            // After the first mesh's layers were drawn.
+            vec![mesh(convex(), 6.0), mesh(Arc::new(open_mesh), 3.0)],
+            // Three pairs where two are allowed.
+            vec![mesh(Arc::new(row_of_boxes(3)), 3.0)],
+            vec![Clip::remove(Shape::Sphere); Clip::MAX + 1],
+            vec![mesh(convex(), f32::NAN)],
+        ] {
+            one.set_clips(&bad).unwrap_err();
+            assert_eq!(summary(&gpu).0, before);
+        }
+        let views = StereoRig::framing(volume.size_mm(), 0.0, 0.0).views(1.0, 1.0, 500.0).unwrap();
+        let look = Look { tolerance: -1.0, ..Look::default() };
+        one.draw(&views, &look, [16, 16]).unwrap_err();
+        one.draw(&views, &Look::default(), [0, 16]).unwrap_err();
+        one.draw(&views, &Look::default(), [1 << 20, 16]).unwrap_err();
         assert_eq!(summary(&gpu).0, before);
-    }
-    let views = StereoRig::framing(volume.size_mm(), 0.0, 0.0).views(1.0, 1.0, 500.0).unwrap();
-    let look = Look { tolerance: -1.0, ..Look::default() };
-    one.draw(&views, &look, [16, 16]).unwrap_err();
-    one.draw(&views, &Look::default(), [0, 16]).unwrap_err();
-    one.draw(&views, &Look::default(), [1 << 20, 16]).unwrap_err();
-    assert_eq!(summary(&gpu).0, before);
-    // And it still works.
-    work(&mut one, &volume);
+        // And it still works.
+        work(&mut one, &volume);
 
-    let mut transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    transfer.opacity.clear();
-    let setup = *one.setup();
-    drop(one);
-    assert!(Renderer::new(&gpu, &volume, transfer, setup, COLOUR).is_err());
-    assert_eq!(gpu.memory_report(), []);
+        let mut transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+        transfer.opacity.clear();
+        let setup = *one.setup();
+        drop(one);
+        assert!(Renderer::new(&gpu, &volume, transfer, setup, COLOUR).is_err());
+        assert_eq!(gpu.memory_report(), []);
+    }
     close(gpu);
 }

@@ -3,10 +3,10 @@
 mod adopt;
 mod consistency;
 mod contextual;
+mod edits;
 mod embed;
 mod exactness;
 mod leaks;
 mod planner;
 mod real_data;
 mod stability;
-mod sweep_edits;

@@ -11,13 +11,20 @@ use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOpt
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::mesh::TriangleMesh;
+use cao_model::methods::{METHODS, Method};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
+use cao_model::view::{StereoRig, View};
 use cao_model::volume::Volume;
 use cao_twin::Grid;
 use glam::Vec3;
 use std::fmt::Write as _;
 use std::sync::Arc;
+
+/// Every method, the default first: what holds for one holds for all.
+pub fn methods() -> impl Iterator<Item = Method> {
+    METHODS.iter().rev().map(|entry| entry.method)
+}
 
 /// A device under core and synchronization validation. Tests end with [`close`].
 pub fn open() -> Gpu {
@@ -209,4 +216,10 @@ pub fn random_clip(random: &mut Random, shape: &Shape, size: Vec3) -> Clip {
 /// Edges of a volume in mm.
 pub fn size_mm(grid: &Grid) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|i| (grid.dims[i] as f64 * grid.spacing[i]) as f32))
+}
+
+/// Both eyes in front of a volume, from `azimuth_deg` about +z.
+pub fn eyes(volume: &Volume, azimuth_deg: f32) -> [View; 2] {
+    let far = 8.0 * volume.size_mm().iter().sum::<f64>() as f32;
+    StereoRig::framing(volume.size_mm(), azimuth_deg, 20.0).views(1.0, far * 1e-3, far).unwrap()
 }
