@@ -1,4 +1,4 @@
-//! Time of the line sweep in plain SIMD code on all cores: `cargo bench --bench sweep_simd`. What the kernels of the sweep
+//! Time of the line sweep in plain SIMD code on all cores: `cargo bench -p cao-benches --bench sweep_simd`. What the kernels of the sweep
 //! are compared with (method.md §4). Prints the median of the runs and their range, for each set of vector instructions
 //! that the processor has; `Target` is what the crate is built for.
 
