@@ -23,7 +23,7 @@ const LANES: usize = 16;
 #[repr(align(64))]
 struct Lanes([f32; LANES]);
 
-/// Below this q = 1 − a counts as opaque where both ends of a segment are, as in `cao::cpu::lao`.
+/// Below this q = 1 − a counts as opaque where both ends of a segment are, as in `cao_twin::cast::lao`.
 const OPAQUE: f32 = 1e-6;
 
 /// How a segment's pair follows from q = 1 − a at its ends (method.md §3).

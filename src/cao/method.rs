@@ -23,7 +23,7 @@ pub trait Ambient: Send + Sync {
         Ok(())
     }
 
-    /// What there is to do after these changes, in order. Where opacities changed, [`Subject::occupancy`] comes before it.
+    /// What there is to do after these changes, in order. Where opacities changed, the subject's occupancy comes before it.
     fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>>;
 
     /// Its volumes.

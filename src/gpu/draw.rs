@@ -28,7 +28,7 @@ impl Recorder {
     /// Draws `vertices / 3` triangles; the vertex shader makes its vertices from their index.
     ///
     /// Under multiview, cover the picture with a rectangle of two triangles and not with one large triangle: the software driver of Mesa
-    /// 22.3 draws every other triangle into the first layer for all views (`tests/gpu_draw.rs` watches for it).
+    /// 22.3 draws every other triangle into the first layer for all views (`tests/gpu/draw.rs` watches for it).
     ///
     /// # Errors
     /// [`Error::Config`] if bindings, immediates or attachments do not fit the pipeline, [`Error::Hazard`] for a missing barrier.

@@ -1,7 +1,7 @@
 //! Opacity after transfer function and clips, in place, and which bricks changed (method.md §5.2, §6):
 //! `V_o(x) = C_visible/(N+9) · TF_o(V(x))` (CAO eq. (5)), stored to 1/65535.
 //!
-//! In: `volume`, `transfer`, the clips, the words of [`super::clip_bricks`] now and at the last edit, `occupancy`. In and out:
+//! In: `volume`, `transfer`, the clips, the words of [`crate::clip::clip_bricks`] now and at the last edit, `occupancy`. In and out:
 //! `opacity` V_o (3D r16unorm), `contact` (where each brick's opacity lies, 27 bits). Out: `change` (f32 a brick: 0 where an
 //! opacity changed, left alone elsewhere), `past` (the changed bricks and what they held before). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
 //! voxel in the others, clip samples only where a clip's surface passes.
