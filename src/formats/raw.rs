@@ -12,7 +12,7 @@ use cao_model::volume::{Volume, check_spacing, voxel_count};
 /// Reads a raw file of `dims` voxels (x fastest) of type `kind` (`uint8`, `i16`, `float`, … as in NRRD) with `spacing`
 /// in mm.
 ///
-/// Errors: [`Error::Config`] for impossible dimensions, type or spacing; [`Error::File`] when the file's size is not
+/// Errors: [`cao_model::Error::Config`] for impossible dimensions, type or spacing; [`Error::File`] when the file's size is not
 /// exactly dimensions × type, or values are NaN or infinite.
 pub fn read_raw(
     path: &Path,

@@ -293,7 +293,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file, key, what was found and what would do; the
-    /// errors of [`TriangleMesh::load_obj`], [`TriangleMesh::outward`] and [`TransferFunction::load`] for files it
+    /// errors of [`obj::load`], [`TriangleMesh::outward`](cao_model::mesh::TriangleMesh::outward) and [`transfer::load`] for files it
     /// names.
     pub fn load(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
@@ -303,7 +303,7 @@ impl Scene {
     /// Reads the text described at the [module](self); paths in it are relative to `base`.
     ///
     /// # Errors
-    /// As [`Scene::load`], with [`Error::Config`] in place of [`Error::File`].
+    /// As [`Scene::load`], with [`cao_model::Error::Config`] in place of [`Error::File`].
     pub fn from_toml(text: &str, base: &Path) -> Result<Self> {
         let file: SceneFile =
             toml::from_str(text).map_err(|error| Error::refused("scene", in_line(text, &error)))?;

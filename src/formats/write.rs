@@ -11,7 +11,7 @@ use cao_model::volume::{IDENTITY, Space, Volume};
 /// Writes one value a voxel of `like` as a NRRD file: 32-bit float, raw, little-endian, x fastest, with the spacing
 /// of `like`, and with its origin, directions and space if it has any. `content` becomes the field of that name.
 ///
-/// Errors: [`Error::Config`] when `data` has not `like.len()` values; [`Error::Io`] as [`write_atomic`].
+/// Errors: [`cao_model::Error::Config`] when `data` has not `like.len()` values; [`Error::Io`] as [`write_atomic`].
 pub fn write_nrrd(path: &Path, like: &Volume, data: &[f32], content: &str) -> Result<()> {
     if data.len() != like.len() {
         let problem = format!("{} values, expected {} as the volume has voxels", data.len(), like.len());
