@@ -6,15 +6,15 @@ use crate::cast::full::Full;
 use crate::clip::classify::{AFFECTED, CLIPPED, UNTOUCHED};
 use crate::drive::Part;
 use crate::field::bricks::BrickList;
+use crate::rays::traced::Traced;
 use crate::subject::Subject;
-use crate::sweep::swept::Swept;
 use crate::verify::compare::Recomputed;
 use cao_gpu::{Buffer, Image, Timings};
 use cao_model::methods::Method;
 
 /// Keeps V_AO equal to what the subject's settings define. Owns its volumes and pipelines.
 pub trait Ambient: Send + Sync {
-    /// Takes the subject's settings, which are new; every value will have to be computed. Uses the device's queue and waits for it.
+    /// Takes the subject's settings, which are new; every value will have to be computed. Never uses the device's queue.
     ///
     /// # Errors
     /// Settings that this method does not have; then nothing has changed.
@@ -125,7 +125,7 @@ const MAKERS: &[Maker] = &[
         map_radius: crate::cast::map_radius,
     },
     // Changes are found in the opacities; nothing is dilated.
-    Maker { method: Method::Sweep, new: |on| Ok(Box::new(Swept::new(on)?)), map_radius: |_| 0.0 },
+    Maker { method: Method::Rays, new: |on| Ok(Box::new(Traced::new(on)?)), map_radius: |_| 0.0 },
 ];
 
 fn maker(on: &Subject) -> &'static Maker {

@@ -88,10 +88,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, when the method is another,
-    /// and for the tables of some methods. On error everything stays as it was.
+    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, and when the method is
+    /// another. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
-        setup.occlusion.check(f64::from(self.subject.field.min_spacing()))?;
+        setup.check(f64::from(self.subject.field.min_spacing()))?;
         let before = std::mem::replace(&mut self.subject.setup, setup);
         match self.prepare_clips().and_then(|()| self.hold(before)) {
             Ok(changed) => self.changed = changed,
@@ -322,8 +322,8 @@ impl Renderer {
         Ok(image)
     }
 
-    /// Voxels of each category after the last update; a sweep tells recomputed bricks from others only, and counts nothing as
-    /// clipped. Uses the device's queue and waits for it.
+    /// Voxels of each category after the last update; rays by brick tell recomputed bricks from others only, and count nothing
+    /// as clipped. Uses the device's queue and waits for it.
     pub fn categories(&self) -> Result<Categories> {
         self.ambient.categories(&self.subject)
     }
@@ -340,7 +340,7 @@ impl Renderer {
         Ok(read_values(&self.subject.gpu, self.ambient.fields().opacity)?)
     }
 
-    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of a sweep 1 in the bricks that the last update computed and 2
+    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of rays by brick 1 in those that the last update computed and 2
     /// elsewhere. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_mask(&self) -> Result<Vec<u8>> {
         self.current()?;

@@ -56,11 +56,10 @@ const CRATES: &[Crate] = &[
         &["cao", "cao-formats", "cao-gpu", "cao-kernels", "cao-model", "cao-twin"],
         &["bytemuck", "glam", "kuva", "serde", "serde_json", "thiserror"],
     ),
-    uses("benches/simd", "cao-simd", &[], &[]),
     uses(
         "src/cli",
         "cao-cli",
-        &["cao", "cao-formats", "cao-gpu", "cao-measure", "cao-model", "cao-simd", "cao-twin"],
+        &["cao", "cao-formats", "cao-gpu", "cao-measure", "cao-model", "cao-twin"],
         &["anyhow", "clap", "glam", "indicatif", "serde_json", "thiserror"],
     ),
     // For tests and benches.
@@ -74,7 +73,7 @@ const CRATES: &[Crate] = &[
 ];
 
 /// Crates that hold unsafe code. All others forbid it.
-const UNSAFE_IN: [&str; 2] = ["src/gpu", "benches/simd"];
+const UNSAFE_IN: [&str; 1] = ["src/gpu"];
 
 /// Crates whose libraries may print: the programs' own, and what cargo runs for us.
 const LOUD: [&str; 2] = ["src/cli", "benches"];
@@ -184,7 +183,6 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/mesh.rs", &["error"]),
     ("src/model/occlusion.rs", &["error"]),
     ("src/model/look.rs", &["error"]),
-    ("src/model/lattice.rs", &["occlusion"]),
     ("src/model/methods.rs", &["error", "occlusion"]),
     ("src/model/settings.rs", &["error", "methods", "occlusion"]),
     ("src/model/clip.rs", &["error", "mesh"]),
@@ -212,10 +210,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/field/", &["error", "stage"]),
     ("src/cao/clip/", &["error", "stage", "field"]),
     ("src/cao/cast/", &["error", "stage", "field", "clip"]),
-    ("src/cao/sweep/", &["error", "stage", "field", "clip", "cast"]),
+    ("src/cao/rays/", &["error", "stage", "field", "clip"]),
     ("src/cao/draw/", &["error", "stage", "field", "clip"]),
     ("src/cao/verify/", &["error", "stage", "field", "cast", "draw"]),
-    ("src/cao/renderer.rs", &["error", "stage", "field", "clip", "cast", "sweep", "draw", "verify"]),
+    ("src/cao/renderer.rs", &["error", "stage", "field", "clip", "cast", "rays", "draw", "verify"]),
     ("src/measure/failure.rs", &[]),
     ("src/measure/error.rs", &[]),
     ("src/measure/random.rs", &[]),
@@ -291,7 +289,7 @@ fn sources(folders: &[&str]) -> BTreeMap<String, String> {
 
 /// Everything that is built into a library or a program.
 fn built() -> BTreeMap<String, String> {
-    sources(&["src", "spirv", "benches/simd"])
+    sources(&["src", "spirv"])
 }
 
 /// Source without comments: documentation may point anywhere.
@@ -388,7 +386,7 @@ fn modules_use_only_what_stands_above_them() {
 fn a_use_of_something_below_is_caught_however_it_is_written() {
     for (file, planted, caught) in [
         ("src/cao/cast/lao.rs", "use crate::renderer::Renderer;", "uses renderer"),
-        ("src/cao/cast/lao.rs", "use crate::{Result, sweep::near};", "uses sweep"),
+        ("src/cao/cast/lao.rs", "use crate::{Result, rays::rays};", "uses rays"),
         (
             "src/cao/clip/dilate.rs",
             "use crate::{\n    field::{Field, BRICK},\n    draw::eyes,\n};",
@@ -408,7 +406,7 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
         ("src/cao/cast/lao.rs", "use ash::vk;", "uses ash"),
         ("src/measure/chart/draw.rs", "let x = kuva::Plot::new();", "uses kuva"),
         ("src/cao/renderer.rs", "use anyhow::Result;", "uses anyhow"),
-        ("src/cao/cast/lao.rs", "use super::super::sweep;", "super::super"),
+        ("src/cao/cast/lao.rs", "use super::super::rays;", "super::super"),
         ("src/cao/attic.rs", "", "not in the table"),
         ("src/attic/lib.rs", "use tobj::Mesh;", "uses tobj"),
     ] {
@@ -676,8 +674,7 @@ const UNFINISHED: [&str; 3] = ["todo!", "unimplemented!", "dbg!"];
 fn noises(file: &str, text: &str) -> Vec<String> {
     let code = code(text);
     // How a build script speaks to cargo.
-    let loud = LOUD.iter().any(|folder| file.starts_with(&format!("{folder}/")))
-        && !file.starts_with("benches/simd/");
+    let loud = LOUD.iter().any(|folder| file.starts_with(&format!("{folder}/")));
     let words = if loud || file.ends_with("/build.rs") { &UNFINISHED[..] } else { &NEVER[..] };
     words.iter().filter(|word| code.contains(**word)).map(|word| format!("{file}: {word}")).collect()
 }
@@ -688,9 +685,7 @@ fn libraries_print_nothing_and_leave_nothing_to_do() {
     let wrong: Vec<String> = files.iter().flat_map(|(file, text)| noises(file, text)).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert!(LOUD.iter().all(|folder| CRATES.iter().any(|c| c.folder == *folder)));
-    for library in
-        ["src/cao/cast/lao.rs", "src/formats/raw.rs", "spirv/compile/mod.rs", "benches/simd/lib.rs"]
-    {
+    for library in ["src/cao/cast/lao.rs", "src/formats/raw.rs", "spirv/compile/mod.rs"] {
         assert_eq!(noises(library, "eprintln!(\"here\");"), [format!("{library}: println!")]);
     }
     assert_eq!(noises("src/cao/cast/lao.rs", "else { todo!() }"), ["src/cao/cast/lao.rs: todo!"]);
@@ -711,7 +706,7 @@ fn flowing(text: &str) -> String {
     text.lines().map(bare).collect::<Vec<_>>().join(" ")
 }
 
-/// Sections of a page that are cited: "page.md §5.2", "page.md section 4", "page.md §4, sparse sweeps; section 5", "page.md §2–§4".
+/// Sections of a page that are cited: "page.md §5.2", "page.md section 4", "page.md §4, many rays; section 5", "page.md §2–§4".
 fn cited(page: &str, text: &str) -> Vec<String> {
     let text = flowing(text);
     let mut found = Vec::new();
@@ -771,7 +766,7 @@ fn every_section_that_is_cited_is_there() {
 fn a_citation_of_a_section_that_is_not_there_is_caught() {
     for (text, expected) in [
         ("//! The reach (method.md §5.2): far.", vec!["5.2"]),
-        ("// (method.md section 4, sparse sweeps; section 5)", vec!["4", "5"]),
+        ("// (method.md section 4, many rays; section 5)", vec!["4", "5"]),
         ("/// as of method.md\n/// §3. The first piece", vec!["3"]),
         ("//! Rules (method.md §2–§4), and §9 of another.", vec!["2", "4"]),
         ("(method.md §4, §5.2, see CAO §3.4)", vec!["4", "5.2"]),

@@ -165,6 +165,7 @@ fn every_ray_set_and_rule_meets_its_closed_form_in_a_uniform_volume() {
         ("14w", "cell", left * (1.0 + q) / 2.0),
         ("26w", "segment", segment),
         ("50w", "left", left),
+        ("spiral:50", "segment", segment),
     ] {
         let answer = folder.json(&format!(
             "occlusion builtin:uniform:9 --transfer tenth.toml --radius-mm 3 --rays {rays} --quadrature {rule} -o ao.nrrd"
@@ -311,7 +312,7 @@ fn a_scene_is_drawn_for_both_eyes_side_by_side_and_one_by_one() {
             assert!(answer["stages_ms"][stage].as_f64().is_some_and(|ms| ms > 0.0), "{stage}: {answer}");
         }
     };
-    has_stages(&answer, &["carve", "choose", "sweep", "raycast"]);
+    has_stages(&answer, &["carve", "choose", "rays", "raycast"]);
     // A rule of the paper asks for the paper's method.
     for flags in ["--method cao", "--quadrature left"] {
         let answer = folder.json(&format!("render scene.toml {flags} -o cao.png"));
@@ -364,8 +365,8 @@ fn a_budget_chooses_among_what_the_flags_leave_open_and_says_what_it_measured() 
     let scene = "occlusion builtin:engine:24 --radius-mm 5 --needed-only --clip sphere --clip-scale 8";
     for (limits, budget, tried) in [
         ("--method lao --rays 26w", "--budget-error 0.5", 3),
-        ("--rays 14w --quadrature segment", "--budget-ms 1e5", 2),
-        ("--method sweep", "--budget-error 0.5", 4),
+        ("--rays 14w --quadrature segment", "--budget-ms 1e5", 1),
+        ("--method rays --quadrature hybrid", "--budget-error 0.5", 5),
     ] {
         let answer = folder.json(&format!("{scene} {limits} {budget} -o chosen.nrrd"));
         let planned = &answer["planned"];

@@ -81,7 +81,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
-        "            affected: share of the voxels near what the clip changed, of sweeps in whole bricks, mean (the paper's Table 2)"
+        "            affected: share of the voxels near what the clip changed, of rays by brick in whole ones, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
