@@ -282,7 +282,7 @@ impl Calibration {
     /// The candidate to take.
     ///
     /// # Errors
-    /// [`Error::Config`] where none fits, with what can be reached.
+    /// [`cao_model::Error::Config`] where none fits, with what can be reached.
     pub fn choose(&self, budget: Budget) -> Result<Measured> {
         let by = |key: fn(&Measured) -> f64| move |a: &&Measured, b: &&Measured| key(a).total_cmp(&key(b));
         let fitting = self.measured.iter().filter(|m| budget.holds(m));

@@ -242,7 +242,7 @@ pub struct ImageReference {
     pub device_ms: f64,
 }
 
-/// The image reference: the ray cast of [`crate::cpu::raycast`] with the plan's steps on the smallest spacing, the ambient
+/// The image reference: the ray cast of [`cao_twin::draw::raycast`] with the plan's steps on the smallest spacing, the ambient
 /// factor of each of its samples evaluated by the ambient integral around that very point. For small images: every sample of
 /// every ray costs what a voxel costs. The frame's own `ambient` and `step_mm` are not used. Uses the device's queue and waits for it.
 #[expect(clippy::too_many_arguments, reason = "scene, lengths and settings, each named once")]

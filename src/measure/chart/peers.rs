@@ -62,7 +62,7 @@ impl Peers {
     /// Reads the file's text.
     ///
     /// # Errors
-    /// [`Error::Config`] naming line and key.
+    /// [`cao_model::Error::Config`] naming line and key.
     pub fn parse(text: &str) -> Result<Self> {
         serde_json::from_str(text).map_err(|error| {
             Error::refused(

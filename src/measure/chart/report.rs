@@ -26,7 +26,7 @@ details summary { cursor: pointer }
 /// The report of a chart; `machine` names the computer, `command` is what made it.
 ///
 /// # Errors
-/// [`crate::Error::Config`] where a picture cannot be encoded.
+/// [`cao_model::Error::Config`] where a picture cannot be encoded.
 pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) -> Result<String> {
     let every: Vec<_> = chart.scenes.iter().collect();
     let mut body = String::from("<h1>Ambient occlusion after a change: time against error</h1>\n");

@@ -2,7 +2,7 @@
 //! the eyes move apart.
 //!
 //! Points are what the left eye's picture shows and the right eye sees too. Control: occlusion from each eye's depth image
-//! ([`crate::cpu::ssao`]), with the same radius.
+//! ([`cao_twin::measure::ssao`]), with the same radius.
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly, mean, quantile};
 use crate::Result;
