@@ -7,13 +7,15 @@
 //! `set_*` say what the scene is; `record_*` write the work that this needs into a command buffer and never touch a queue,
 //! so that a host embeds them in its frame; `update` and `draw` do the same on the device's own queue and wait.
 
+use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::brick_distance::BrickDistance;
 use crate::draw::eyes::{FrameBuffer, check_count};
 use crate::draw::raycast::{Bindings, Raycast};
 use crate::drive::{self, Part};
 use crate::field::Field;
-use crate::host::{read_values, volume_image};
-use crate::method::{self, Ambient, Categories, Changed};
+use crate::field::volume_image;
+use crate::host::read_values;
+use crate::method;
 use crate::stages;
 use crate::subject::Subject;
 use crate::{Error, Result};

@@ -2,7 +2,7 @@
 
 use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::lattice::LatticeRays;
 use cao_model::methods::Samples;

@@ -11,7 +11,7 @@ use cao::field::bricks::BrickList;
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::sweep::carve::{Bindings, Carve};
 use cao::sweep::near::{CHANGED, FAR};
 use cao::sweep::past::PastBricks;

@@ -5,7 +5,7 @@ use cao::cast::volumes::{Kernels, Volumes};
 use cao::drive::{self, Part};
 use cao::field::Field;
 use cao::field::bricks::{BrickList, Which};
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::stages::{BRICKS, LAO};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;

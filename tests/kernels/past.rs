@@ -1,6 +1,6 @@
 //! The kernel `past`: opacities of the listed bricks are exchanged with what is kept of them, and twice leaves everything as it was.
 
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::sweep::past::{Past, PastBricks};
 use cao_gpu::Format;
 use cao_measure::random::Random;

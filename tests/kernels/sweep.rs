@@ -1,7 +1,7 @@
 //! The kernels `sweep` and `sweep_list` against the twin that evaluates every window directly (method.md §4).
 
 use cao::field::Field;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::sweep::near::{ANEW, CHANGED, Chosen, TODO};
 use cao::sweep::sweep::{Bindings, Pass, Sweep, SweepPlan};
 use cao::sweep::sweep_list;

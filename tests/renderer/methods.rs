@@ -4,11 +4,10 @@
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Gpu, Phase};
 use cao_measure::exactness::{Plan, verify};
-use cao_model::METHODS;
 use cao_model::clip::Shape;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
-use cao_testing::{close, open};
+use cao_testing::{close, methods, open};
 
 fn renderer(gpu: &Gpu, volume: &str, method: Method) -> Renderer {
     let volume = cao_formats::open(volume).unwrap();
@@ -22,17 +21,17 @@ fn renderer(gpu: &Gpu, volume: &str, method: Method) -> Renderer {
 #[test]
 fn every_method_is_exact_after_any_clip() {
     let gpu = open();
-    for entry in METHODS {
+    for method in methods() {
         for (volume, shapes, seed) in [
             ("builtin:fruit:24", &Shape::ANALYTIC[..], 1),
             ("builtin:engine:40x36x20:1,1,2", &[Shape::Plane][..], 3),
         ] {
-            let mut renderer = renderer(&gpu, volume, entry.method);
+            let mut renderer = renderer(&gpu, volume, method);
             let plan = Plan { shapes: shapes.to_vec(), poses: 10, seed };
             let report = verify(&mut renderer, &plan, &mut |_| ()).unwrap();
             assert_eq!(report.cuts.len(), 10 * shapes.len());
-            assert!(!report.vacuous(), "{} {volume}: nothing was compared", entry.name);
-            assert!(report.exact(), "{} {volume}: {:?} {:?}", entry.name, report.total(), report.stereo);
+            assert!(!report.vacuous(), "{} {volume}: nothing was compared", method.name());
+            assert!(report.exact(), "{} {volume}: {:?} {:?}", method.name(), report.total(), report.stereo);
         }
     }
     close(gpu);
@@ -42,11 +41,11 @@ fn every_method_is_exact_after_any_clip() {
 #[test]
 fn every_method_spends_time_in_its_ambient_phase() {
     let gpu = open();
-    for entry in METHODS {
-        let mut renderer = renderer(&gpu, "builtin:engine:24", entry.method);
+    for method in methods() {
+        let mut renderer = renderer(&gpu, "builtin:engine:24", method);
         let timings = renderer.update(&mut |_| ()).unwrap();
         // Queues without timestamps tell no times.
-        assert!(timings.is_empty() || timings.of(Phase::Ambient) > 0.0, "{}: {timings:?}", entry.name);
+        assert!(timings.is_empty() || timings.of(Phase::Ambient) > 0.0, "{}: {timings:?}", method.name());
     }
     close(gpu);
 }

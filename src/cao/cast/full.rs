@@ -3,12 +3,11 @@
 use super::volumes::{Kernels, Volumes};
 use super::{classified, local, unclipped};
 use crate::Result;
+use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation, Recomputed};
 use crate::drive::{self, Part};
 use crate::field::bricks::BrickList;
-use crate::method::{Ambient, Categories, Changed, Fields, Recomputation};
 use crate::stages;
 use crate::subject::Subject;
-use crate::verify::compare::Recomputed;
 use cao_gpu::{Image, Timings};
 
 /// The method `lao`.

@@ -5,13 +5,13 @@ pub mod full;
 pub mod lao;
 pub mod volumes;
 
+use crate::ambient::Changed;
 use crate::cast::lao::{Bindings, Work};
 use crate::cast::volumes::{Kernels, Volumes};
 use crate::clip::classify::Classify;
 use crate::drive::Part;
 use crate::field::BRICK;
 use crate::field::bricks::{BrickList, Which};
-use crate::method::Changed;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Access, Image, Stage};
@@ -108,7 +108,11 @@ fn over_bricks<'a>(k: &'a Kernels, on: &'a Subject, stage: Stage, work: Work, b:
                 k.lao.record_part(rec, field, occlusion, reference_mm, scope, work, b, base, count)?;
             }
         }
-        rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::TransferWrite]);
+        // What follows V_PAO writes the mask that these rays may have read, and another list.
+        rec.barrier(
+            &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
+            &[Access::SampledRead, Access::StorageWrite, Access::TransferWrite],
+        );
         Ok(())
     })
 }

@@ -126,10 +126,10 @@ impl SweepPlan {
             let across: [usize; 2] = [usize::from(axis == 0), if axis == 2 { 1 } else { 2 }];
             let tiles = [0, 1].map(|i| dims[across[i]].div_ceil(kernel::TILE[i]));
             let stride = ray.step[axis].unsigned_abs();
-            // A run is a chunk with a voxel and `lag` more; between two runs is one at least.
+            // A run is `lag` chunks at least, between two is one, and the last begins at the latest behind the last with a voxel.
             let size = window.min(CHUNK);
             let (chunks, lag) = (dims[axis].div_ceil(stride).div_ceil(size), window / size + 1);
-            let runs = tiles[0] * tiles[1] * stride * chunks.div_ceil(lag + 2);
+            let runs = tiles[0] * tiles[1] * stride * (chunks / (lag + 1) + 1);
             walks.push(Walk { ray, parts, axis, window, segments, pieces, length_mm, tiles, runs });
         }
         Ok(Self { walks, residual: rays.residual, offset_mm, reach_mm })

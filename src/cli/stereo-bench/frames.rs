@@ -3,7 +3,7 @@
 use super::path;
 use super::way::Way;
 use anyhow::{Context, Result};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
 use cao_measure::split::Split;
