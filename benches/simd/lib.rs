@@ -7,7 +7,7 @@
 //! the rest of one block, from a scan backwards, and the beginning of the next, from a scan forwards. The line and its
 //! reverse share their segments and both scans: the reverse needs the same two with the parts exchanged.
 //!
-//! What makes it fast here: [`LANES`] neighbouring lines at once, side by side along x (along y for the lines along x), in
+//! What makes it fast here: `LANES` neighbouring lines at once, side by side along x (along y for the lines along x), in
 //! loops that the compiler turns into vector instructions, compiled for each of [`Vectors`]; lines are cut to their part
 //! inside the volume; a plane of rows is fetched once for all lines that stay in it; logarithms are taken once a voxel (a
 //! table of λ was not needed: the two divisions of a segment cost more); every thread has a sum of its own, so that none waits.

@@ -814,3 +814,25 @@ fn a_citation_of_a_section_that_is_not_there_is_caught() {
     let found = astray("method.md", &sections(page), file, "// method.md §1.2, section 3");
     assert_eq!(found, [format!("{file} cites method.md §1.2"), format!("{file} cites method.md §3")]);
 }
+
+// -------------------------------------------------------------------------------------------------------------- README
+
+/// Rows of the table of methods.
+fn method_rows(page: &str) -> Vec<[String; 3]> {
+    let cells = |line: &str| -> Option<[String; 3]> {
+        let cells: Vec<_> = line.strip_prefix('|')?.strip_suffix('|')?.split('|').map(str::trim).collect();
+        let [name, title, source] = cells.try_into().ok()?;
+        Some([name.strip_prefix('`')?.strip_suffix('`')?, title, source].map(str::to_owned))
+    };
+    page.lines().filter_map(cells).collect()
+}
+
+#[test]
+fn the_readme_is_short_and_its_methods_are_those_of_the_list() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    assert!(readme.lines().count() <= 100, "{} lines", readme.lines().count());
+    let listed: Vec<_> =
+        cao_model::METHODS.iter().map(|m| [m.name, m.title, m.source].map(str::to_owned)).collect();
+    assert_eq!(method_rows(&readme), listed);
+    assert_eq!(method_rows("| `a` | An A | CAO |\n| name | title | source |"), [["a", "An A", "CAO"]]);
+}
