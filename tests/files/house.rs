@@ -215,7 +215,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/stages.rs", &[]),
     ("src/cao/host.rs", &[]),
     ("src/cao/drive.rs", &["error"]),
-    ("src/cao/field/", &["error", "host"]),
+    ("src/cao/field/", &["error", "host", "drive"]),
     ("src/cao/clip/", &["error", "host", "stages", "field"]),
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),

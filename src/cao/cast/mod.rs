@@ -11,7 +11,7 @@ use crate::cast::volumes::{Kernels, Volumes};
 use crate::clip::classify::Classify;
 use crate::drive::Part;
 use crate::field::BRICK;
-use crate::field::bricks::{BrickList, Which};
+use crate::field::bricks::Which;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Access, Image, Stage};
@@ -99,7 +99,7 @@ fn over_bricks<'a>(k: &'a Kernels, on: &'a Subject, stage: Stage, work: Work, b:
         * setup.occlusion.rays.directions().len() as f64
         * f64::from(setup.occlusion.samples(f64::from(field.min_spacing())).max(1));
     let first = (4e6 / brick_samples).clamp(1.0, 1e6) as u32;
-    Part::items(stage, (&b.list.buffer, BrickList::COUNT_AT), first, move |rec, items| {
+    Part::items(stage, b.list.items(field), first, move |rec, items| {
         let (occlusion, reference_mm, scope) = (&setup.occlusion, on.reference_mm(), setup.scope);
         match items {
             None => k.lao.record(rec, field, occlusion, reference_mm, scope, work, b)?,

@@ -20,7 +20,7 @@ use crate::Result;
 use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed};
 use crate::clip::classify::{AFFECTED, Classify, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
-use crate::drive::{self, Part};
+use crate::drive::{self, Pace, Part};
 use crate::field::bricks::BrickList;
 use crate::field::volume_image;
 use crate::field::{BRICK, Field};
@@ -319,7 +319,7 @@ impl Ambient for Swept {
         });
         let mut parts = vec![everything, self.choose(on, true, &all)];
         parts.extend(self.sweep(Target { on, todo: &all, ambient: into }));
-        let timings = drive::run(&on.gpu, &parts, progress)?;
+        let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);
         let words: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&on.gpu, &all)?);
         let bricks: Vec<u32> =
