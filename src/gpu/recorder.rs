@@ -227,6 +227,11 @@ impl Recorder {
         Ok(())
     }
 
+    /// What was recorded so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
     /// Begins a stage: a label for debuggers, and a time in [`Timings`]. Stages may be nested.
     ///
     /// # Errors
