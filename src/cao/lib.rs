@@ -18,7 +18,7 @@
 //! | [`gpu`] | Vulkan and nothing else, another crate: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
 //! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
 //! | [`cast`] [`rays`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
-//! | [`method`] [`drive`] | what a method is to the renderer; the two ways to walk its parts |
+//! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
 //! | [`verify`] | instruments: is it exact, do both eyes see the same, what would other settings give |
 //! | [`stages`] | every stage whose time is taken |
@@ -57,6 +57,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod ambient;
 pub mod cast;
 pub mod clip;
 pub mod draw;

@@ -2,7 +2,7 @@
 
 use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;

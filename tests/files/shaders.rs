@@ -289,7 +289,7 @@ fn a_struct_in_memory_has_every_member_and_every_gap() {
     let expected = [
         ("Inner", 32, vec![("scale", 0, 16), ("count", 16, 4), ("pad", 20, 12)]),
         ("Params", 64, vec![("dims", 0, 16), ("inner", 16, 32), ("step", 48, 4), ("pad", 52, 12)]),
-        ("Out", 8, vec![("total", 0, 4)]),
+        ("Out", 4, vec![("total", 0, 4)]),
         ("Push", 32, vec![("eye", 0, 16), ("index", 16, 4), ("pad", 20, 12)]),
     ];
     assert_eq!(structs, expected);

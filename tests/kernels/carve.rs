@@ -13,7 +13,7 @@ use cao::field::near::FAR;
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::random::Random;
 use cao_model::clip::Clip;

@@ -2,10 +2,10 @@
 
 use cao::cast::lao::{Bindings, Work};
 use cao::cast::volumes::{Kernels, Volumes};
-use cao::drive::{self, Part};
+use cao::drive::{self, Pace, Part};
 use cao::field::Field;
-use cao::field::bricks::{BrickList, Which};
-use cao::host::volume_image;
+use cao::field::bricks::Which;
+use cao::field::volume_image;
 use cao::stages::{BRICKS, LAO};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;
@@ -69,7 +69,7 @@ impl<'a> Bench<'a> {
             Ok(k.bricks.record(rec, field, which, opacity, mask, &v.changed_before, &v.list)?)
         });
         // So few at first that there are several parts.
-        let rays = Part::items(LAO, (&v.list.buffer, BrickList::COUNT_AT), 5, move |rec, items| {
+        let rays = Part::items(LAO, v.list.items(field), 5, move |rec, items| {
             match items {
                 None => k.lao.record(rec, field, occlusion, *reference_mm, *scope, Work::Full, b)?,
                 Some(items) => {
@@ -97,7 +97,7 @@ impl<'a> Bench<'a> {
         let out = self.out();
         run(self.gpu, |rec| self.kernels.lao.record_rays(rec, &settings.occlusion).unwrap());
         let mut last = 0.0;
-        drive::run(self.gpu, &self.parts(opacity, &out, settings), &mut |part| {
+        drive::run(self.gpu, &self.parts(opacity, &out, settings), &mut Pace::default(), &mut |part| {
             assert!(part >= last && part <= 1.0);
             last = part;
         })

@@ -2,7 +2,7 @@
 
 use cao::field::Field;
 use cao::field::bricks::BrickList;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::rays::rays::{Bindings, RayPlan, Rays};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;

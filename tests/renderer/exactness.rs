@@ -1,10 +1,11 @@
 //! The central claim (CAO §4): contextual ambient occlusion equals a full recomputation bit for bit, on every voxel that
 //! has a value; the check itself is checked, and made to fail.
 
+use cao::ambient::Recomputed;
 use cao::field::Field;
 use cao::field::bricks::{BrickList, Bricks, Which};
 use cao::renderer::{COLOUR, Renderer};
-use cao::verify::compare::{Compare, Difference, Recomputed};
+use cao::verify::compare::{Compare, Difference};
 use cao_gpu::Gpu;
 use cao_measure::exactness;
 use cao_measure::random::Random;

@@ -6,18 +6,17 @@
 
 use super::rays::{Bindings, RayPlan, Rays};
 use crate::Result;
+use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed};
 use crate::clip::carve::{self, Carve};
 use crate::clip::classify::{AFFECTED, Classify, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
-use crate::drive::{self, Part};
+use crate::drive::{self, Pace, Part};
 use crate::field::bricks::BrickList;
 use crate::field::near::{self, FAR, Near, TODO};
-use crate::field::{BRICK, Field};
-use crate::host::{read_buffer, volume_image};
-use crate::method::{Ambient, Changed, Fields, Recomputation};
+use crate::field::{BRICK, Field, volume_image};
+use crate::host::read_buffer;
 use crate::stages;
 use crate::subject::Subject;
-use crate::verify::compare::Recomputed;
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Timings};
 
 /// Device memory of one scene, beside the volume itself.
@@ -184,7 +183,7 @@ impl Traced {
         let on = to.on;
         // The first slice is small enough for any device.
         let first = (4e6 / plan.brick_samples()).clamp(1.0, 1e6) as u32;
-        Part::items(stages::RAYS, (&to.list.buffer, BrickList::COUNT_AT), first, move |rec, items| {
+        Part::items(stages::RAYS, to.list.items(&on.field), first, move |rec, items| {
             let b = Bindings { opacity: &v.opacity, list: to.list, ambient: to.ambient };
             let (field, reference_mm, scope) = (&on.field, on.reference_mm(), on.setup.scope);
             match items {
@@ -194,7 +193,10 @@ impl Traced {
                     k.rays.record_part(rec, field, plan, reference_mm, scope, b, base, count)?;
                 }
             }
-            rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite, Access::SampledRead]);
+            rec.barrier(
+                &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
+                &[Access::SampledRead, Access::StorageWrite, Access::TransferWrite],
+            );
             Ok(())
         })
     }
@@ -238,7 +240,7 @@ impl Ambient for Traced {
             Ok(())
         });
         let parts = [everything, self.choose(to), self.trace(to)];
-        let timings = drive::run(&on.gpu, &parts, progress)?;
+        let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);
         Ok((Recomputation { list, recomputed: Recomputed::Bricks(&v.todo) }, timings))
     }
