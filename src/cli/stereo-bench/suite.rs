@@ -159,7 +159,9 @@ fn plan(cli: &Cli) -> Result<Plan> {
 
 fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
-    let setup = setup(&cli.settings, &volume, Method::Cao, cli.all_voxels)?;
+    // A rule asks for a method that has it; other methods take their own.
+    let method = cli.settings.quadrature.map_or(Method::Cao, |rule| Method::for_rule(Some(rule)));
+    let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })

@@ -51,18 +51,16 @@ impl Way {
         match self {
             // What is not shown is not computed: without a neighbourhood nothing is occluded. So does `cao render --solid`.
             Self::Solid => setup.occlusion.radius_mm = 0.0,
-            Self::By(method) => {
-                setup.method = method;
-                if !method.has(setup.occlusion.quadrature) {
-                    setup.occlusion.quadrature = method.quadrature();
-                }
-            }
+            Self::By(method) => setup.method = method,
             Self::CaoLiteral => {
                 setup.method = Method::Cao;
                 // The literal recipe has one resolution for both maps.
                 let resolution = shared.maps.resolution;
                 setup.maps = MapSettings { literal: true, cells: resolution, ..shared.maps };
             }
+        }
+        if !setup.method.has(setup.occlusion.quadrature) {
+            setup.occlusion.quadrature = setup.method.quadrature();
         }
         setup
     }

@@ -196,7 +196,7 @@ mod tests {
         }
     }
 
-    /// An opaque half-space below a voxel takes half of its rays, but for those that run along its surface.
+    /// An opaque half-space below a voxel, half a voxel away, takes nearly half of its light: 0.569 is the converged integral.
     #[test]
     fn half_space_takes_half() {
         let grid = Grid { dims: [33, 33, 24], spacing: [1.0; 3] };
@@ -205,7 +205,7 @@ mod tests {
         for rule in Quadrature::BRICK {
             let found = rays(&grid, &opacity, &settings(254, rule, 12.0), 1.0, false);
             let value = f64::from(found[grid.index([16, 16, 12])]) / 65535.0;
-            assert!((value - 0.5).abs() < 0.06, "{rule:?}: {value}");
+            assert!((value - 0.569).abs() < 0.03, "{rule:?}: {value}");
             // Inside nothing comes through.
             assert_eq!(found[grid.index([16, 16, 6])], 0, "{rule:?}");
         }
@@ -218,18 +218,19 @@ mod tests {
         for a in [0.02_f64, 0.1, 0.4, 0.8] {
             let opacity = vec![(a * 65535.0).round() as u16; grid.len()];
             for rule in Quadrature::BRICK {
-                for (offset_mm, step_mm, length) in [
-                    (None, None, 9.5),
-                    (Some(0.2), None, 9.5),
-                    (None, Some(0.5), 9.75),
-                    (Some(1.0), Some(2.0), 9.0),
+                // The last half cell has the mean of a whole one, which is more where steps are long.
+                for (offset_mm, step_mm, length, off) in [
+                    (None, None, 9.5, 2e-3),
+                    (Some(0.2), None, 9.5, 2e-3),
+                    (None, Some(0.5), 9.75, 2e-3),
+                    (Some(1.0), Some(2.0), 9.0, 4e-3),
                 ] {
                     let occlusion = Occlusion { offset_mm, step_mm, ..settings(14, rule, 10.0) };
                     let found = rays(&grid, &opacity, &occlusion, 1.0, false);
                     let value = f64::from(found[grid.index([13, 13, 13])]) / 65535.0;
                     let x = -(1.0 - a).ln() * length;
                     let expected = (1.0 - (-x).exp()) / x;
-                    assert!((value - expected).abs() < 2e-3, "{rule:?} a={a}: {value} {expected}");
+                    assert!((value - expected).abs() < off, "{rule:?} a={a}: {value} {expected}");
                 }
             }
         }
