@@ -12,6 +12,7 @@ use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet, fibonacci};
 use cao_twin::Grid;
 use cao_twin::cast::lao::lao_at;
 use cao_twin::measure::reference::reference;
+use cao_twin::rays::rays::rays_at;
 
 /// Sizes and values of the trial.
 #[derive(Clone, Debug)]
@@ -90,9 +91,16 @@ const PUBLISHED: [Way; 4] = [
     Way::unit(RaySet::R54, Quadrature::Left),
 ];
 
+/// Rays by brick: what its rules cost, and its directions gain.
+const BRICK: [Way; 3] = [
+    Way::unit(RaySet::Spiral(50), Quadrature::Nearest),
+    Way::unit(RaySet::Spiral(50), Quadrature::Hybrid),
+    Way::unit(RaySet::Spiral(50), Quadrature::Linear),
+];
+
 /// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
-    let ways: Vec<Way> = SETS.into_iter().chain(RULES).chain(PUBLISHED).collect();
+    let ways: Vec<Way> = SETS.into_iter().chain(RULES).chain(PUBLISHED).chain(BRICK).collect();
     // missed[way][thickness][orientation]: found − truth; above 0 light comes through that does not.
     let mut missed = vec![Vec::new(); ways.len()];
     let normals = fibonacci(plan.orientations);
@@ -130,7 +138,10 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
         })
         .collect();
     let first = SETS.len() + RULES.len();
-    let paper: Vec<Series> = (first..ways.len()).map(|i| Series::control(ways[i].name(), curve(i))).collect();
+    let by_brick: Vec<Series> =
+        (first + PUBLISHED.len()..ways.len()).map(|i| Series::ours(ways[i].name(), curve(i))).collect();
+    let paper: Vec<Series> =
+        (first..first + PUBLISHED.len()).map(|i| Series::control(ways[i].name(), curve(i))).collect();
     let best = sets[SETS.len() - 1].clone();
     let by_angle = by_angle(&normals, &missed, first, SETS.len() - 1);
 
@@ -142,7 +153,8 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     Ok(Finding {
         sentence: format!(
             "Of the light that an opaque sheet stops, eq. (2) at unit steps misses up to {} with 54 rays, at a thickness of {} voxels ({} with \
-             6 rays; {} at {} voxels), and 6 rays miss up to {} with the best rule; {} {} with the segment rule and 50 weighted rays, {} with 26.",
+             6 rays; {} at {} voxels), and 6 rays miss up to {} with the best rule; {} {} with the segment rule and 50 weighted rays, {} with 26; \
+             rays by brick in 50 spiral directions {} with the nearest voxel, {} with the rule hybrid and {} with the filter.",
             short(worst_at[1]),
             short(worst_at[0]),
             short(paper[0].largest()),
@@ -152,6 +164,9 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             if better { "ours at most" } else { "OURS IS NOT BETTER THROUGHOUT: up to" },
             short(best.largest()),
             short(sets[5].largest()),
+            short(by_brick[0].largest()),
+            short(by_brick[1].largest()),
+            short(by_brick[2].largest()),
         ),
         ours: Ours::holding(better),
         control_fails: worst_at[1] > 2.0 * best.largest(),
@@ -183,6 +198,12 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
                     .into_iter()
                     .chain([Series { name: "50w rays, segment, step 1 (ours)".into(), ..best }])
                     .collect(),
+            },
+            Chart {
+                title: "Rays by brick, 50 spiral directions, step 1".into(),
+                x: Quantity::linear("thickness of the sheet, voxels"),
+                y: Quantity::linear("largest missed occlusion of all orientations (0 … 1)"),
+                series: by_brick,
             },
             Chart {
                 title: "Missed occlusion by orientation, all thicknesses".into(),
@@ -236,7 +257,10 @@ fn errors(normal: [f64; 3], distance: f64, thickness: f64, plan: &Plan, ways: &[
             offset_mm: Some(OFFSET),
             step_mm: Some(way.step),
         };
-        lao_at(&grid, &opacity, &occlusion, 1.0, middle)
+        match Quadrature::BRICK.contains(&way.quadrature) {
+            true => rays_at(&grid, &opacity, &occlusion, 1.0, middle),
+            false => lao_at(&grid, &opacity, &occlusion, 1.0, middle),
+        }
     };
     let integral =
         Integral::ambient(f64::from(RADIUS), f64::from(OFFSET), 8, plan.directions, grid.min_spacing());

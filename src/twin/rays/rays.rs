@@ -41,6 +41,17 @@ pub fn rays(
     })
 }
 
+/// Ambient value of one voxel, whether it needs one or not. The device rounds opacities to 65535ths first.
+pub fn rays_at(
+    grid: &Grid,
+    opacity: &[f32],
+    occlusion: &Occlusion,
+    reference_mm: f32,
+    voxel: [usize; 3],
+) -> f64 {
+    f64::from(Rays::new(grid, opacity, occlusion, reference_mm).value(voxel)) / 65535.0
+}
+
 /// 1 − a; a trilinear opacity of opaque matter is opaque, whatever it rounds.
 fn clear(a: f64) -> f64 {
     if 1.0 - a < 1e-6 { 0.0 } else { 1.0 - a }
