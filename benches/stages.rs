@@ -78,7 +78,7 @@ fn stages(criterion: &mut Criterion) {
     for stage in ["opacity", "occupancy", "bricks"] {
         bench.stage(stage, stage, retransfer.clone());
     }
-    for quadrature in Quadrature::ALL {
+    for quadrature in Quadrature::CAST {
         let mut lao = Setup { method: Method::Lao, ..setup };
         lao.occlusion.quadrature = quadrature;
         set(&mut bench, lao);
@@ -110,12 +110,15 @@ fn stages(criterion: &mut Criterion) {
         renderer.set_clips(&[sphere(if turn % 2 == 0 { -8.0 } else { 8.0 })]).expect("a clip");
     });
 
-    let mut swept = Setup { method: Method::Sweep, ..setup };
-    swept.occlusion.quadrature = Quadrature::Segment;
-    swept.occlusion.rays = RaySet::W26;
-    set(&mut bench, swept);
-    bench.stage("sweep 26w", "sweep", |renderer, _| renderer.invalidate());
-    for stage in ["carve", "choose", "amend"] {
+    for quadrature in Quadrature::BRICK {
+        let mut by_brick = Setup { method: Method::Rays, ..setup };
+        by_brick.occlusion.quadrature = quadrature;
+        by_brick.occlusion.rays = RaySet::Spiral(50);
+        set(&mut bench, by_brick);
+        let name = format!("rays spiral:50 {}", quadrature.name());
+        bench.stage(&name, "rays", |renderer, _| renderer.invalidate());
+    }
+    for stage in ["carve", "choose"] {
         bench.stage(stage, stage, |renderer, turn| {
             renderer.set_clips(&[sphere(to_and_fro(turn))]).expect("a clip");
         });

@@ -64,7 +64,7 @@ fn twins(criterion: &mut Criterion) {
     group.bench_function("occupancy", |b| {
         b.iter(|| twin::field::occupancy::occupancy(&grid, black_box(&values), &transfer));
     });
-    for quadrature in Quadrature::ALL {
+    for quadrature in Quadrature::CAST {
         let occlusion = Occlusion { rays: RaySet::R6, quadrature, ..occlusion };
         group.bench_function(format!("lao 6 {}", quadrature.name()), |b| {
             b.iter(|| twin::cast::lao::lao(&grid, black_box(&opacity), &occlusion, reference_mm));

@@ -1,4 +1,4 @@
-// Texels of r16unorm are whole numbers of parts. So are the opacities of a sweep, and what a ray contributes.
+// Texels of r16unorm are whole numbers of parts: opacities of rays by brick, and their values.
 
 // Parts of 1.
 const PARTS = 65535.0;

@@ -1,2 +1,2 @@
 // Directions of the largest ray set.
-const MOST_RAYS = 54u;
+const MOST_RAYS = 254u;

@@ -13,12 +13,7 @@ struct Contact {
     bits: array<u32>,
 }
 
-// Bit sx + 2 sy + 4 sz: whether a brick b + (0 ... sx, 0 ... sy, 0 ... sz) has opacity.
-struct Solid {
-    bits: array<u32>,
-}
-
-// What is to be done in it: TODO, ANEW, CHANGED.
+// What is to be done in it: TODO or nothing.
 struct Todo {
     brick: array<u32>,
 }

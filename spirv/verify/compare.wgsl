@@ -1,6 +1,6 @@
 // Bit by bit comparison of two ambient volumes on every voxel that has a value: all but clipped voxels that touch no visible
 // one, and, where only needed voxels are computed, voxels without opacity in their 3x3x3. The list holds the bricks of the
-// full computation; no other brick has such voxels. After a sweep, which has no mask, bricks tell what was recomputed.
+// full computation; no other brick has such voxels. Of rays by brick, which have no mask, bricks tell what was recomputed.
 
 struct CompareParams {
     dims: vec3<u32>,

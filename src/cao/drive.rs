@@ -1,7 +1,7 @@
 //! The two ways to walk the parts of an update: into a host's command buffer, or on the device's own queue with progress.
 
 use crate::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Stage, Timings};
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Stage, Timing, Timings};
 use std::ops::Range;
 use std::time::Instant;
 
@@ -30,7 +30,18 @@ type Record<'a> = dyn Fn(&mut Recorder, Option<Range<u32>>) -> Result<()> + 'a;
 enum Extent<'a> {
     Short,
     Long,
-    Items { count: &'a Buffer, count_at: u64, first: u32 },
+    Items { items: Items<'a>, first: u32 },
+}
+
+/// A list of items on the device.
+#[derive(Clone, Copy)]
+pub struct Items<'a> {
+    /// Where their number is, a u32,
+    pub count: &'a Buffer,
+    /// at this byte.
+    pub at: u64,
+    /// How many there are at most.
+    pub most: u32,
 }
 
 impl<'a> Part<'a> {
@@ -44,15 +55,15 @@ impl<'a> Part<'a> {
         Self { extent: Extent::Long, ..Self::short(stage, record) }
     }
 
-    /// One over a list of items, whose number is a u32 at `count_at` of `count` when everything before it has run: recorded whole, or
-    /// some items at a time, `first` at first.
+    /// One over a list of items, whose number is known to the device when everything before it has run: recorded whole, or some items at a
+    /// time, `first` at first.
     pub fn items(
         stage: Stage,
-        (count, count_at): (&'a Buffer, u64),
+        items: Items<'a>,
         first: u32,
         record: impl Fn(&mut Recorder, Option<Range<u32>>) -> Result<()> + 'a,
     ) -> Self {
-        Self { stage, extent: Extent::Items { count, count_at, first }, record: Box::new(record) }
+        Self { stage, extent: Extent::Items { items, first }, record: Box::new(record) }
     }
 
     /// What it is.
@@ -60,10 +71,45 @@ impl<'a> Part<'a> {
         self.stage
     }
 
-    fn is_short(&self) -> bool {
-        matches!(self.extent, Extent::Short)
+    /// What it takes at most, in ms; unknown where nobody has seen it run.
+    fn at_most(&self, pace: &Pace) -> Option<f64> {
+        match self.extent {
+            Extent::Short => Some(0.0),
+            Extent::Long => pace.ms(self.stage),
+            Extent::Items { items, .. } => Some(pace.ms(self.stage)? * f64::from(items.most)),
+        }
     }
 }
+
+/// How long an item of a stage took, ms, as far as that was seen.
+#[derive(Default)]
+pub struct Pace(Vec<(Stage, f64)>);
+
+impl Pace {
+    fn ms(&self, stage: Stage) -> Option<f64> {
+        self.0.iter().find(|(of, _)| *of == stage).map(|(_, ms)| *ms)
+    }
+
+    fn learn(&mut self, stage: Stage, ms: f64) {
+        self.forget(stage);
+        self.0.push((stage, ms));
+    }
+
+    fn forget(&mut self, stage: Stage) {
+        self.0.retain(|(of, _)| *of != stage);
+    }
+
+    /// Nothing is known: other settings take another time.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// No submission takes longer than this, in ms, so that no driver takes one for a hang.
+const TENTH_MS: f64 = 100.0;
+
+/// How much longer than foreseen a part may take.
+const MARGIN: f64 = 2.0;
 
 /// Records all parts, whole, ordered after everything before and before everything after.
 pub fn record(rec: &mut Recorder, parts: &[Part]) -> Result<()> {
@@ -79,38 +125,56 @@ pub fn record(rec: &mut Recorder, parts: &[Part]) -> Result<()> {
     Ok(())
 }
 
-/// Runs all parts on the device's own queue: short ones together, long ones one by one, lists in slices of about a tenth of a second, so that
-/// no driver takes one for a hang. Tells `progress` the share done (0 … 1), waits for the end.
-pub fn run(gpu: &Gpu, parts: &[Part], progress: &mut dyn FnMut(f64)) -> Result<Timings> {
-    let all = parts.iter().filter(|part| !part.is_short()).count().max(1) as f64;
-    let (mut timings, mut done) = (Timings::new(), 0.0);
-    for together in parts.chunk_by(|a, b| a.is_short() && b.is_short()) {
-        let part = &together[0];
+/// Runs all parts on the device's own queue: in one submission where `pace` says that it takes less than a tenth of a second; else those that
+/// may take longer one by one, lists in slices. Tells `progress` the share done (0 … 1), waits for the end.
+pub fn run(gpu: &Gpu, parts: &[Part], pace: &mut Pace, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
+    let (mut timings, mut first) = (Timings::new(), 0);
+    let mut expected = 0.0;
+    for (i, part) in parts.iter().enumerate() {
+        if let Some(ms) = part.at_most(pace).filter(|ms| MARGIN * (expected + ms) <= TENTH_MS) {
+            expected += ms;
+            continue;
+        }
+        together(gpu, &parts[first..i], pace, &mut timings)?;
+        let share = |of: f64| (i as f64 + of) / parts.len() as f64;
+        let start = Instant::now();
         match part.extent {
             Extent::Short | Extent::Long => {
-                let mut rec = gpu.recorder(part.stage.name)?;
-                record(&mut rec, together)?;
-                rec.submit_and_wait()?.into_iter().for_each(|t| add(&mut timings, t.stage, t.ms));
+                together(gpu, std::slice::from_ref(part), pace, &mut timings)?;
+                pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3);
             }
-            Extent::Items { count, count_at, first } => {
-                let count = read_count(gpu, count, count_at)?;
-                let ms = in_parts(
-                    gpu,
-                    part.stage,
-                    count,
-                    first,
-                    &mut |rec, items| (part.record)(rec, Some(items)),
-                    &mut |share| progress((done + share) / all),
-                )?;
+            Extent::Items { items, first } => {
+                let count = read_count(gpu, items)?;
+                let mut record = |rec: &mut Recorder, items: Range<u32>| (part.record)(rec, Some(items));
+                let told = &mut |of: f64| progress(share(of));
+                let ms = in_parts(gpu, part.stage, count, first, &mut record, told)?;
                 add(&mut timings, part.stage, ms);
+                // What there are few of says little of many.
+                if count > 0 {
+                    pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3 / f64::from(count));
+                }
             }
         }
-        if !part.is_short() {
-            done += 1.0;
-            progress(done / all);
-        }
+        progress(share(1.0));
+        (first, expected) = (i + 1, 0.0);
     }
+    together(gpu, &parts[first..], pace, &mut timings)?;
+    progress(1.0);
     Ok(timings)
+}
+
+/// Parts in one submission.
+fn together(gpu: &Gpu, parts: &[Part], pace: &mut Pace, timings: &mut Timings) -> Result<()> {
+    let Some(part) = parts.first() else { return Ok(()) };
+    let mut rec = gpu.recorder(part.stage.name)?;
+    record(&mut rec, parts)?;
+    for Timing { stage, ms } in rec.submit_and_wait()? {
+        if ms > TENTH_MS {
+            pace.forget(stage);
+        }
+        add(timings, stage, ms);
+    }
+    Ok(())
 }
 
 /// Parts of one stage in a row have one time.
@@ -121,11 +185,11 @@ fn add(timings: &mut Timings, stage: Stage, ms: f64) {
     }
 }
 
-fn read_count(gpu: &Gpu, buffer: &Buffer, at: u64) -> Result<u32> {
+fn read_count(gpu: &Gpu, Items { count, at, .. }: Items) -> Result<u32> {
     let read_back = gpu.buffer("count", 4, BufferUse::Readback)?;
     let mut rec = gpu.recorder("count")?;
     rec.barrier(&ANYTHING, &ANYTHING);
-    rec.copy_buffer(buffer, at, &read_back, 0, 4)?;
+    rec.copy_buffer(count, at, &read_back, 0, 4)?;
     rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
     rec.submit_and_wait()?;
     Ok(bytemuck::pod_read_unaligned(&read_back.read(0, 4)?))
@@ -157,4 +221,22 @@ pub fn in_parts(
         part = (f64::from(now) * pace.clamp(0.25, 4.0)).clamp(1.0, 1e7) as u32;
     }
     Ok(total_ms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::{BRICKS, LAO};
+
+    #[test]
+    fn what_was_never_seen_takes_no_known_time() {
+        let mut pace = Pace::default();
+        let part = Part::long(LAO, |_| Ok(()));
+        assert_eq!((part.at_most(&pace), Part::short(BRICKS, |_| Ok(())).at_most(&pace)), (None, Some(0.0)));
+        pace.learn(LAO, 3.0);
+        pace.learn(LAO, 2.0);
+        assert_eq!(part.at_most(&pace), Some(2.0));
+        pace.forget(LAO);
+        assert_eq!(part.at_most(&pace), None);
+    }
 }

@@ -1,8 +1,7 @@
 //! What the host sides of kernels share.
 
-use crate::field::Field;
 use cao_gpu::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image};
 use cao_kernels::shared::bricks::GROUPS_PER_ROW;
 use cao_kernels::shared::parts::PARTS;
 
@@ -39,12 +38,6 @@ macro_rules! same_layout {
     };
 }
 pub(crate) use same_layout;
-
-/// A 3D image of the field's size that kernels sample and store to.
-pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> Result<Image> {
-    let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
-    gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
-}
 
 /// Texels of a volume, x fastest; slices at a time, a sixteenth of it, so that reading takes little memory. Uses the device's queue and
 /// waits for it.

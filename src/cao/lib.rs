@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! volume ─ Renderer::new ─ [occupancy] ─ [opacity, clips, ambient: the method] ─ [distances] ─ [raycast, all views] ─ image / engine's swapchain
-//!           field/           field/        cast/ sweep/, with clip/                draw/         draw/
+//!           field/           field/        cast/ rays/, with clip/                 draw/         draw/
 //! ```
 //!
 //! # The modules
@@ -17,8 +17,8 @@
 //! | [`model`] | plain data, another crate: volumes, transfer functions, clips, views, settings, [`METHODS`]. Files come by `cao-formats` |
 //! | [`gpu`] | Vulkan and nothing else, another crate: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
 //! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
-//! | [`cast`] [`sweep`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
-//! | [`method`] [`drive`] | what a method is to the renderer; the two ways to walk its parts |
+//! | [`cast`] [`rays`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
+//! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
 //! | [`verify`] | instruments: is it exact, do both eyes see the same, what would other settings give |
 //! | [`stages`] | every stage whose time is taken |
@@ -57,6 +57,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod ambient;
 pub mod cast;
 pub mod clip;
 pub mod draw;
@@ -65,10 +66,10 @@ pub mod error;
 pub mod field;
 pub mod host;
 pub mod method;
+pub mod rays;
 pub mod renderer;
 pub mod stages;
 pub mod subject;
-pub mod sweep;
 pub mod verify;
 
 pub use cao_gpu as gpu;

@@ -7,13 +7,15 @@
 //! `set_*` say what the scene is; `record_*` write the work that this needs into a command buffer and never touch a queue,
 //! so that a host embeds them in its frame; `update` and `draw` do the same on the device's own queue and wait.
 
+use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::brick_distance::BrickDistance;
 use crate::draw::eyes::{FrameBuffer, check_count};
 use crate::draw::raycast::{Bindings, Raycast};
-use crate::drive::{self, Part};
+use crate::drive::{self, Pace, Part};
 use crate::field::Field;
-use crate::host::{read_values, volume_image};
-use crate::method::{self, Ambient, Categories, Changed};
+use crate::field::volume_image;
+use crate::host::read_values;
+use crate::method;
 use crate::stages;
 use crate::subject::Subject;
 use crate::{Error, Result};
@@ -51,6 +53,7 @@ pub struct Renderer {
     raycast: Raycast,
     frame: FrameBuffer,
     changed: Changed,
+    pace: Pace,
     /// Times of preparing clip meshes since the last update.
     prepared: Timings,
 }
@@ -74,6 +77,7 @@ impl Renderer {
             frame: FrameBuffer::new(gpu)?,
             subject,
             changed: Changed::ALL,
+            pace: Pace::default(),
             prepared: Timings::new(),
         })
     }
@@ -88,13 +92,16 @@ impl Renderer {
         Ok(())
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, when the method is another,
-    /// and for the tables of some methods. On error everything stays as it was.
+    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, and when the method is
+    /// another. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
-        setup.occlusion.check(f64::from(self.subject.field.min_spacing()))?;
+        setup.check(f64::from(self.subject.field.min_spacing()))?;
         let before = std::mem::replace(&mut self.subject.setup, setup);
         match self.prepare_clips().and_then(|()| self.hold(before)) {
-            Ok(changed) => self.changed = changed,
+            Ok(changed) => {
+                self.changed = changed;
+                self.pace.clear();
+            }
             Err(error) => {
                 // Maps of one radius under rays of another would leave voxels stale.
                 self.subject.setup = before;
@@ -189,9 +196,11 @@ impl Renderer {
     /// The same on the device's own queue, in parts, telling `progress` the share done. Waits for the end; returns the time of each
     /// stage, clip meshes prepared since the last update included.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
-        let mut timings = self.prepared.clone();
-        timings.extend(drive::run(&self.subject.gpu, &self.parts(), progress)?);
-        self.prepared.0.clear();
+        let mut timings = std::mem::take(&mut self.prepared);
+        let mut pace = std::mem::take(&mut self.pace);
+        let ran = drive::run(&self.subject.gpu, &self.parts(), &mut pace, progress);
+        self.pace = pace;
+        timings.extend(ran?);
         self.changed = Changed::NOTHING;
         Ok(timings)
     }
@@ -304,7 +313,7 @@ impl Renderer {
     pub(crate) fn update_opacity(&mut self) -> Result<()> {
         let mut parts = self.parts();
         parts.retain(|part| matches!(part.stage().phase, Phase::Opacity | Phase::Clip));
-        drive::run(&self.subject.gpu, &parts, &mut |_| ())?;
+        drive::run(&self.subject.gpu, &parts, &mut Pace::default(), &mut |_| ())?;
         drop(parts);
         self.changed = Changed::ALL;
         Ok(())
@@ -322,8 +331,8 @@ impl Renderer {
         Ok(image)
     }
 
-    /// Voxels of each category after the last update; a sweep tells recomputed bricks from others only, and counts nothing as
-    /// clipped. Uses the device's queue and waits for it.
+    /// Voxels of each category after the last update; rays by brick tell recomputed bricks from others only, and count nothing
+    /// as clipped. Uses the device's queue and waits for it.
     pub fn categories(&self) -> Result<Categories> {
         self.ambient.categories(&self.subject)
     }
@@ -340,7 +349,7 @@ impl Renderer {
         Ok(read_values(&self.subject.gpu, self.ambient.fields().opacity)?)
     }
 
-    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of a sweep 1 in the bricks that the last update computed and 2
+    /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of rays by brick 1 in those that the last update computed and 2
     /// elsewhere. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_mask(&self) -> Result<Vec<u8>> {
         self.current()?;

@@ -7,7 +7,7 @@ pub const PEEL: Stage = Stage::new("peel", Phase::Clip);
 /// Dilation maps of a clip mesh.
 pub const DILATE: Stage = Stage::new("dilate", Phase::Clip);
 /// The table of rays.
-pub const RAYS: Stage = Stage::new("rays", Phase::Prepare);
+pub const DIRECTIONS: Stage = Stage::new("directions", Phase::Prepare);
 /// The bricks of V_PAO.
 pub const PRECOMPUTE_BRICKS: Stage = Stage::new("precompute bricks", Phase::Prepare);
 /// V_PAO.
@@ -26,12 +26,10 @@ pub const BRICKS: Stage = Stage::new("bricks", Phase::Ambient);
 pub const LAO: Stage = Stage::new("lao", Phase::Ambient);
 /// Rays of the voxels that a clip affects.
 pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
-/// The bricks to amend and to compute anew.
+/// The bricks within reach of a change.
 pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
-/// Rays that meet a change, taken back and walked again.
-pub const AMEND: Stage = Stage::new("amend", Phase::Ambient);
-/// Lines of bricks that are computed anew.
-pub const SWEEP: Stage = Stage::new("sweep", Phase::Ambient);
+/// Rays of these bricks.
+pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 /// How far rays of the picture may leap.
 pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
 /// The picture.

@@ -40,7 +40,7 @@ pub struct Subject {
 impl Subject {
     /// Copies a volume to the device. Uses the device's queue and waits for it.
     pub(crate) fn new(gpu: &Gpu, volume: &Volume, transfer: TransferFunction, setup: Setup) -> Result<Self> {
-        setup.occlusion.check(volume.min_spacing())?;
+        setup.check(volume.min_spacing())?;
         transfer.check()?;
         let field = Field::upload(gpu, volume)?;
         Ok(Self {

@@ -76,15 +76,16 @@ pub struct Settings {
     /// Distance from the voxel's centre in mm at which they start [default: half a step]
     #[arg(long, value_name = "O", value_parser = length, allow_hyphen_values = true)]
     pub offset_mm: Option<f32>,
-    /// Distance in mm between their samples, of sweeps at most [default: the smallest spacing; of sweeps 1.75 times that, with 50w and 54 1.45 times]
+    /// Distance in mm between their samples [default: the smallest spacing]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
 }
 
 fn rays_help() -> String {
-    let defaults = by_method(|entry| entry.rays.name().into());
+    let defaults = by_method(|entry| entry.rays.name());
     format!(
-        "Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted [default: {defaults}]"
+        "Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted; spiral:N for any even N up to {} [default: {defaults}]",
+        RaySet::MOST
     )
 }
 
@@ -163,7 +164,7 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
     occlusion.offset_mm = settings.offset_mm;
     occlusion.step_mm = settings.step_mm;
-    occlusion.check(volume.min_spacing())?;
+    setup.check(volume.min_spacing())?;
     Ok(setup)
 }
 
@@ -234,8 +235,8 @@ mod tests {
     fn help_reads_the_list_of_methods() {
         let text = methods_help();
         assert!(METHODS.iter().all(|e| text.contains(&format!("{}: {}", e.name, e.what))), "{text}");
-        assert!(rays_help().ends_with("[default: lao, cao: 26; sweep: 26w]"), "{}", rays_help());
-        let rules = "lao, cao: left, cell, segment; sweep: segment]";
+        assert!(rays_help().ends_with("[default: lao, cao: 26; rays: spiral:50]"), "{}", rays_help());
+        let rules = "lao, cao: left, cell, segment; rays: hybrid, nearest, linear]";
         assert!(quadrature_help().ends_with(rules), "{}", quadrature_help());
     }
 }

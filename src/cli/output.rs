@@ -2,10 +2,8 @@
 
 use super::args::{Global, usage};
 use anyhow::{Context, Result, bail};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
-use cao_model::lattice::LatticeRays;
-use cao_model::methods::Samples;
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -77,32 +75,15 @@ impl Out {
     pub fn occlusion(&mut self, methods: &str, setup: &Setup, volume: &Volume) {
         let o = setup.occlusion;
         let (rays, quadrature, spacing) = (o.rays.name(), o.quadrature.name(), volume.min_spacing());
-        match setup.method.entry().samples {
-            Samples::Steps => {
-                let (samples, step, first) = (o.samples(spacing), o.step(spacing), o.first(spacing));
-                self.line(format!(
-                    "method    {methods}, rays {rays}, quadrature {quadrature}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
-                    o.radius_mm,
-                ));
-                self.json(json!({
-                    "rays": rays, "quadrature": quadrature, "radius_mm": o.radius_mm,
-                    "samples": samples, "step_mm": step, "first_sample_mm": first
-                }));
-            }
-            Samples::Lattice => {
-                let LatticeRays { rays: directions, residual, .. } = LatticeRays::new(o.rays, volume.spacing);
-                let (count, step, offset) =
-                    (directions.len(), o.lattice_step(spacing), o.lattice_offset(spacing));
-                self.line(format!(
-                    "method    {methods}, rays {rays} ({count} directions, residual {residual:.1e}), quadrature {quadrature}, radius {} mm, from {offset} mm on, samples at most {step} mm apart",
-                    o.radius_mm,
-                ));
-                self.json(json!({
-                    "rays": rays, "directions": count, "residual": residual, "quadrature": quadrature,
-                    "radius_mm": o.radius_mm, "offset_mm": offset, "step_mm": step
-                }));
-            }
-        }
+        let (samples, step, first) = (o.samples(spacing), o.step(spacing), o.first(spacing));
+        self.line(format!(
+            "method    {methods}, rays {rays}, quadrature {quadrature}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
+            o.radius_mm,
+        ));
+        self.json(json!({
+            "rays": rays, "quadrature": quadrature, "radius_mm": o.radius_mm,
+            "samples": samples, "step_mm": step, "first_sample_mm": first
+        }));
     }
 
     /// Size of the picture.

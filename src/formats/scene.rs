@@ -20,12 +20,12 @@
 //!     scale = 40                       # or one number an axis: [40, 40, 20]
 //!
 //!     [occlusion]
-//!     method = "sweep"                 # lines of voxels, where opacities change; "cao": rays, where clips change; "lao": all rays
-//!     rays = "26w"                     # "6" "14w" "26w" "50w", weighted; 14 26 54, equal weights; default of cao and lao: 26
-//!     quadrature = "segment"           # left cell segment; sweeps: segment; default of cao and lao: left, the paper's sum
+//!     method = "rays"                  # rays by brick, where opacities change; "cao": rays, where clips change; "lao": all rays
+//!     rays = "spiral:50"               # any even number up to 254; "6" "14w" "26w" "50w", weighted; 14 26 54, equal weights, as the paper's
+//!     quadrature = "hybrid"            # nearest hybrid linear; of cao and lao, whose rays are 26: left, the paper's sum, cell, segment
 //!     radius_mm = 20                   # default: 20 of the smallest spacing
 //!     offset_mm = 0.5                  # where rays start; default: half a step
-//!     step_mm = 1                      # default: the smallest spacing; of sweeps 1.75 (50w, 54: 1.45) times that, at most
+//!     step_mm = 1                      # default: the smallest spacing
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
@@ -173,7 +173,7 @@ impl OcclusionSettings {
     /// The settings for a volume whose smallest spacing is `min_spacing` mm, checked.
     ///
     /// # Errors
-    /// As [`Occlusion::check`], keys with `occlusion.` before them.
+    /// As [`Setup::check`], keys with `occlusion.` before them.
     pub fn setup(&self, min_spacing: f64) -> Result<Setup> {
         let usual = Setup::of(self.method, min_spacing);
         let occlusion = Occlusion {
@@ -183,8 +183,9 @@ impl OcclusionSettings {
             offset_mm: self.offset_mm,
             step_mm: self.step_mm,
         };
-        occlusion.check(min_spacing).map_err(|error| error.under("occlusion"))?;
-        Ok(Setup { occlusion, scope: self.scope, ..usual })
+        let setup = Setup { occlusion, scope: self.scope, ..usual };
+        setup.check(min_spacing).map_err(|error| error.under("occlusion"))?;
+        Ok(setup)
     }
 }
 

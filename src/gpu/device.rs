@@ -1,9 +1,11 @@
 //! The device: opened by us, or adopted from a host that owns it.
 
 use super::{
+    counts::Counts,
     feature::{self, API_VERSION, EXTENSIONS, Features},
     format::{Format, VulkanFormat},
     hazard::{Hazards, ResourceId},
+    idle::Idle,
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
     validation::{LAYER, ValidationLog, enable_submit_time_checks},
@@ -66,6 +68,9 @@ pub(crate) struct Inner {
     pub instance: ash::Instance,
     pub log: ValidationLog,
     hazards: Mutex<Hazards>,
+    /// What the next recording finds ready.
+    pub idle: Idle,
+    counts: Mutex<Counts>,
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
     /// The loaded library, which all function pointers point into.
@@ -305,6 +310,11 @@ impl Gpu {
         self.0.log.assert_clean()
     }
 
+    /// Commands, barriers, calls and submissions of all recordings so far that were submitted or handed to the host.
+    pub fn counts(&self) -> Counts {
+        *self.0.counts()
+    }
+
     /// Name and bytes of every buffer and image that is alive, sorted by name.
     pub fn memory_report(&self) -> Vec<(String, u64)> {
         self.0.memory.report()
@@ -356,6 +366,8 @@ impl Parts {
             physical,
             log,
             hazards: Mutex::default(),
+            idle: Idle::default(),
+            counts: Mutex::default(),
             owned,
             _entry: entry,
             device,
@@ -368,6 +380,11 @@ impl Inner {
     /// What is pending on all resources.
     pub fn hazards(&self) -> MutexGuard<'_, Hazards> {
         self.hazards.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What was asked of Vulkan so far.
+    pub fn counts(&self) -> MutexGuard<'_, Counts> {
+        self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A number that no other resource of any device has or had.
@@ -391,7 +408,10 @@ impl Drop for Inner {
     fn drop(&mut self) {
         // SAFETY: dropped once, here, before the device whose memory it frees. Everything made with the device holds an `Arc` of
         // this and so is gone.
-        unsafe { ManuallyDrop::drop(&mut self.memory) };
+        unsafe {
+            self.idle.destroy(&self.device);
+            ManuallyDrop::drop(&mut self.memory);
+        }
         if let Some(owned) = self.owned.take() {
             // SAFETY: as above; the handles are ours.
             unsafe { destroy(&self.device, &self.instance, owned) };

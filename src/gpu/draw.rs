@@ -76,6 +76,7 @@ impl Recorder {
         let viewport =
             vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
         self.set(pipeline, vk::PipelineBindPoint::GRAPHICS, resolved, push);
+        self.count(4, 0);
         let device = &self.gpu.device;
         // SAFETY: `cmd` is recording, outside a rendering pass; attachments fit the pipeline and are kept; all state is set.
         unsafe {

@@ -108,7 +108,7 @@ const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
 const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
 
 /// Required uses of formats. `R16_UNORM` is optional: not filtered, 16-bit values become f32 texels (`Gpu::filters`); not
-/// filtered and stored, there are no sweeps (`Gpu::stores`).
+/// filtered and stored, there are no rays by brick (`Gpu::stores`).
 pub const FORMATS: &[FormatNeed] = &[
     FormatNeed {
         format: vk::Format::R32_SFLOAT,

@@ -4,8 +4,10 @@ use super::{
     Buffer, Gpu, Image, Pipeline,
     access::Access,
     bind::{Bind, Bindings, Keep, Resolved, resolve},
+    counts::Counts,
     device::{Inner, vulkan},
     hazard::{Hazards, Touch},
+    idle::{Commands, Idle},
     timing::{Recorded, Stage, Stages, Timings},
 };
 use crate::{Error, Result};
@@ -21,20 +23,20 @@ pub struct Recorder {
     hazards: Hazards,
     keep: Vec<Keep>,
     stages: Stages,
+    counts: Counts,
     /// Our own command buffer; `None` when `cmd` is the host's.
     own: Option<Own>,
 }
 
-/// What a command buffer of our own needs. Dropped after the commands have run or without running them.
+/// A command buffer of our own. Dropped after the commands have run or without running them.
 struct Own {
     gpu: Arc<Inner>,
-    pool: vk::CommandPool,
+    commands: Commands,
 }
 
 impl Drop for Own {
     fn drop(&mut self) {
-        // SAFETY: ours; the commands have run (`submit_and_wait`) or were never submitted. The command buffer goes with its pool.
-        unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
+        self.gpu.idle.give_back(self.commands);
     }
 }
 
@@ -51,21 +53,12 @@ impl Gpu {
                 problem: "the device was adopted and its queue is the host's; use record_into with a command buffer of the host".into(),
             });
         }
-        let create = vk::CommandPoolCreateInfo::default()
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-            .queue_family_index(gpu.queue_family);
-        // SAFETY: the device is alive and has this queue family.
-        let pool = unsafe { gpu.device.create_command_pool(&create, None) }
-            .map_err(vulkan("vkCreateCommandPool", name))?;
         // From here on the drop of `own` cleans up.
-        let own = Own { gpu: gpu.clone(), pool };
-        let allocate = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-        // SAFETY: the pool is alive and used by this recorder only.
-        let list = unsafe { gpu.device.allocate_command_buffers(&allocate) };
-        let cmd = list.map_err(vulkan("vkAllocateCommandBuffers", name))?[0];
+        let own = Own { gpu: gpu.clone(), commands: Idle::commands(gpu, name)? };
+        let cmd = own.commands.buffer;
         gpu.set_name(cmd, name);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the command buffer was just made.
+        // SAFETY: the command buffer was just made or reset.
         unsafe { gpu.device.begin_command_buffer(cmd, &begin) }
             .map_err(vulkan("vkBeginCommandBuffer", name))?;
         Ok(self.record(name, cmd, Some(own)))
@@ -87,7 +80,16 @@ impl Gpu {
         let gpu = self.0.clone();
         let hazards = gpu.hazards().clone();
         let stages = Stages::new(gpu.clone());
-        Recorder { gpu, name: name.into(), cmd, hazards, keep: Vec::new(), stages, own }
+        Recorder {
+            gpu,
+            name: name.into(),
+            cmd,
+            hazards,
+            keep: Vec::new(),
+            stages,
+            counts: Counts::default(),
+            own,
+        }
     }
 }
 
@@ -115,6 +117,7 @@ impl Recorder {
             let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
             self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info);
         }
+        self.count(0, 1);
         self.hazards.discard(image.0.id);
         self.keep.push(image.0.clone());
     }
@@ -129,7 +132,14 @@ impl Recorder {
             .dst_stage_mask(dst_stage)
             .dst_access_mask(dst)];
         self.memory_barrier(&barrier);
+        self.count(0, 1);
         self.hazards.barrier(before, after);
+    }
+
+    /// Counts calls, `barriers` of which are barriers and the rest state.
+    pub(crate) fn count(&mut self, others: u64, barriers: u64) {
+        self.counts.barriers += barriers;
+        self.counts.calls += others + barriers;
     }
 
     fn memory_barrier(&self, barrier: &[vk::MemoryBarrier2<'_>]) {
@@ -217,13 +227,20 @@ impl Recorder {
         Ok(())
     }
 
+    /// What was recorded so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
     /// Begins a stage: a label for debuggers, and a time in [`Timings`]. Stages may be nested.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the device is out of memory.
     pub fn stage(&mut self, stage: Stage) -> Result<()> {
         // SAFETY: `cmd` is recording (ours, or by the promise of `record_into`), outside a rendering pass.
-        unsafe { self.stages.begin(self.cmd, stage) }
+        unsafe { self.stages.begin(self.cmd, stage) }?;
+        self.count(1, 0);
+        Ok(())
     }
 
     /// Ends the innermost stage.
@@ -232,7 +249,9 @@ impl Recorder {
     /// [`Error::Config`] if none has begun.
     pub fn end_stage(&mut self) -> Result<()> {
         // SAFETY: as in `stage`.
-        unsafe { self.stages.end(self.cmd) }
+        unsafe { self.stages.end(self.cmd) }?;
+        self.count(1, 0);
+        Ok(())
     }
 
     /// Runs the commands and waits for them. A full wait: afterwards nothing is pending, mapped buffers may be read, and the next
@@ -240,9 +259,9 @@ impl Recorder {
     ///
     /// # Errors
     /// [`Error::Config`] for a host's command buffer or a stage without end, [`Error::Vulkan`] if the device fails.
-    pub fn submit_and_wait(self) -> Result<Timings> {
+    pub fn submit_and_wait(mut self) -> Result<Timings> {
         self.stages.check_closed()?;
-        let (Some(queue), true) = (&self.gpu.queue, self.own.is_some()) else {
+        let (Some(queue), Some(own)) = (&self.gpu.queue, &self.own) else {
             return Err(Error::Config {
                 what: self.name.clone(),
                 problem: "is recorded into a host's command buffer, which the host submits; end with finish"
@@ -259,11 +278,10 @@ impl Recorder {
         let device = &self.gpu.device;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.cmd)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
-        // SAFETY: the command buffer is ours and recording; queue access is locked; the fence is destroyed after the wait.
+        // SAFETY: the command buffer is ours and recording; queue access is locked; the fence is ours and was reset.
         unsafe {
             device.end_command_buffer(self.cmd).map_err(vulkan("vkEndCommandBuffer", &self.name))?;
-            let fence = device.create_fence(&vk::FenceCreateInfo::default(), None);
-            let fence = fence.map_err(vulkan("vkCreateFence", &self.name))?;
+            let fence = own.commands.fence;
             let locked = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             let submitted = device.queue_submit2(*locked(), &submit, fence);
             let waited = submitted.map_err(vulkan("vkQueueSubmit2", &self.name)).and_then(|()| {
@@ -275,11 +293,13 @@ impl Recorder {
                 // Nothing may be freed while it is in use; an idle or lost queue uses nothing.
                 let _ = device.queue_wait_idle(*locked());
             }
-            device.destroy_fence(fence, None);
             waited?;
         }
+        *self.gpu.counts() += Counts { submissions: 1, ..self.counts };
         self.gpu.hazards().commit_waited(&self.hazards);
-        Ok(self.stages.read()?.unwrap_or_default())
+        let timings = self.stages.read()?.unwrap_or_default();
+        self.stages.give_back();
+        Ok(timings)
     }
 
     /// Ends a recording into a host's command buffer, which stays recording.
@@ -294,6 +314,7 @@ impl Recorder {
                 problem: "is recorded into a command buffer of its own; end with submit_and_wait".into(),
             });
         }
+        *self.gpu.counts() += self.counts;
         self.gpu.hazards().commit_pending(self.hazards);
         Ok(Recorded { stages: self.stages, _keep: self.keep })
     }
@@ -303,6 +324,8 @@ impl Recorder {
         let gpu = self.gpu.hazards();
         touches.iter().for_each(|touch| self.hazards.learn(&gpu, touch.id));
         drop(gpu);
+        self.counts.commands += 1;
+        self.counts.calls += 1;
         self.hazards.command(command, touches).map_err(|problem| Error::Hazard { problem })
     }
 
@@ -353,6 +376,7 @@ impl Recorder {
                 self.gpu.device.cmd_push_constants(self.cmd, inner.layout, inner.stages, 0, push);
             }
         }
+        self.count(1 + u64::from(!writes.is_empty()) + u64::from(!push.is_empty()), 0);
         drop(writes);
         self.keep.extend(resolved.keep);
         self.keep.push(inner.clone());

@@ -3,6 +3,7 @@
 use super::{
     bind::Keep,
     device::{Inner, vulkan},
+    idle::Idle,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -142,11 +143,7 @@ impl Stages {
         unsafe {
             if self.gpu.timestamp_mask != 0 && stage.is_multiple_of(STAGES_PER_POOL) {
                 let count = 2 * STAGES_PER_POOL;
-                let create = vk::QueryPoolCreateInfo::default()
-                    .query_type(vk::QueryType::TIMESTAMP)
-                    .query_count(count);
-                let pool = self.gpu.device.create_query_pool(&create, None);
-                let pool = pool.map_err(vulkan("vkCreateQueryPool", name))?;
+                let pool = Idle::queries(&self.gpu, count, name)?;
                 self.pools.push(pool);
                 self.gpu.device.cmd_reset_query_pool(cmd, pool, 0, count);
             }
@@ -221,6 +218,11 @@ impl Stages {
             }
         }
         Ok(Some(timings))
+    }
+
+    /// Gives the pools back, once all commands have run and their times were read.
+    pub fn give_back(&mut self) {
+        self.gpu.idle.give_back_queries(self.pools.drain(..));
     }
 
     fn milliseconds(&self, begin: u64, end: u64) -> f64 {

@@ -4,7 +4,7 @@
 
 use super::random::Random;
 use crate::Result;
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao::renderer::Renderer;
 use cao::verify::compare::Difference;
 use cao_gpu::{Phase, Timings};

@@ -105,18 +105,19 @@ pub fn candidates(
         Some(only) => entry.method == only,
         None => stands_for(entry.same_values_as, setup.method) == entry.method,
     };
-    let methods: Vec<&Entry> = METHODS.iter().filter(chosen).collect();
     let mut list = Vec::new();
-    for set in RaySet::ALL.into_iter().filter(|set| rays.is_none_or(|only| *set == only)) {
-        for rule in Quadrature::ALL.into_iter().filter(|rule| quadrature.is_none_or(|only| *rule == only)) {
-            let occlusion = Occlusion { rays: set, quadrature: rule, ..setup.occlusion };
-            // Sets that a method does not list are for who asks for them.
-            let tries = |entry: &&&Entry| {
-                entry.quadratures.contains(&rule) && (rays.is_some() || entry.sets.contains(&set))
-            };
-            list.extend(methods.iter().filter(tries).map(|e| Candidate { method: e.method, occlusion }));
+    for entry in METHODS.iter().filter(chosen) {
+        // Sets that a method does not list are for who asks for them.
+        let sets = rays.as_ref().map_or(entry.sets, std::slice::from_ref);
+        for &rays in sets {
+            for &rule in entry.quadratures.iter().filter(|rule| quadrature.is_none_or(|only| **rule == only))
+            {
+                let occlusion = Occlusion { rays, quadrature: rule, ..setup.occlusion };
+                list.push(Candidate { method: entry.method, occlusion });
+            }
         }
     }
+    list.sort_by_key(|candidate| candidate.occlusion.rays.count());
     list
 }
 
@@ -133,8 +134,8 @@ fn probed(candidate: &Candidate) -> bool {
     candidate.method.values() == Method::Lao
 }
 
-/// Tries candidates, the cheaper ones first where they stand first, on sample bricks of the scene as it is; methods that do not cast
-/// rays voxel by voxel are computed and timed as a whole, since a brick alone costs them more than among its neighbours. Where a budget is given, candidates that cannot be its
+/// Tries candidates, the cheaper ones first where they stand first, on sample bricks of the scene as it is; other
+/// methods than those of rays by the sampler are computed and timed as a whole. Where a budget is given, candidates that cannot be its
 /// choice, by the time that fewer rays took, are left out. The renderer's ambient volume is out of date afterwards and its setup may be
 /// another. `progress` hears the share done (0 … 1). Uses the device's queue and waits for it.
 ///
@@ -184,7 +185,7 @@ struct Tried {
 
 impl Tried {
     fn rays(candidate: &Candidate) -> f64 {
-        candidate.occlusion.rays.directions().len() as f64
+        candidate.occlusion.rays.count() as f64
     }
 
     fn hopeless(&self, candidate: &Candidate) -> bool {
@@ -583,16 +584,16 @@ mod tests {
         let hopeless = |tried: &Tried, method| sets.map(|rays| tried.hopeless(&of(method, rays)));
         // 1 ms a ray: 6 ms keep the budget, so that what takes more than 12 ms is out, of this method only.
         let mut tried = new(Budget::Error(0.1), f64::INFINITY);
-        let six = of(Method::Sweep, RaySet::R6);
+        let six = of(Method::Rays, RaySet::R6);
         tried.add(Measured { candidate: six, rmse: 0.2, bound: 0.2, ms: 6.0 });
-        assert_eq!(hopeless(&tried, Method::Sweep), [false; 7], "nothing keeps the budget yet");
+        assert_eq!(hopeless(&tried, Method::Rays), [false; 7], "nothing keeps the budget yet");
         tried.add(Measured { candidate: six, rmse: 0.05, bound: 0.1, ms: 6.0 });
-        assert_eq!(hopeless(&tried, Method::Sweep), sets.map(|rays| rays != RaySet::R6));
+        assert_eq!(hopeless(&tried, Method::Rays), sets.map(|rays| rays != RaySet::R6));
         assert_eq!(hopeless(&tried, Method::Cao), [false; 7]);
         // 10 ms allow 20.
         let mut tried = new(Budget::Milliseconds(12.5), 10.0);
         tried.add(Measured { candidate: of(Method::Lao, RaySet::R6), rmse: 0.2, bound: 0.2, ms: 6.0 });
-        let far = |rays: RaySet| rays.directions().len() > 20;
+        let far = |rays: RaySet| rays.count() > 20;
         assert_eq!(hopeless(&tried, Method::Lao), sets.map(far));
     }
 
@@ -603,21 +604,22 @@ mod tests {
         let count = |list: &[Candidate], method| list.iter().filter(|c| c.method == method).count();
         let all = candidates(&setup, None, None, None);
         assert!(all.iter().all(|c| c.occlusion.radius_mm == 7.0));
-        assert_eq!(count(&all, Method::Cao), RaySet::ALL.len() * Quadrature::ALL.len());
-        assert_eq!((count(&all, Method::Lao), count(&all, Method::Sweep)), (0, 4));
+        assert_eq!(count(&all, Method::Cao), RaySet::ALL.len() * Quadrature::CAST.len());
+        assert_eq!((count(&all, Method::Lao), count(&all, Method::Rays)), (0, 15));
+        assert!(all.is_sorted_by_key(|c| c.occlusion.rays.count()), "the cheaper ones first");
         let lao = candidates(&Setup { method: Method::Lao, ..setup }, None, None, None);
         assert_eq!((count(&lao, Method::Cao), count(&lao, Method::Lao)), (0, 21));
 
         let some = candidates(&setup, None, Some(RaySet::R26), None);
         assert!(some.iter().all(|c| c.occlusion.rays == RaySet::R26));
-        assert_eq!((count(&some, Method::Cao), count(&some, Method::Sweep)), (3, 1));
+        assert_eq!((count(&some, Method::Cao), count(&some, Method::Rays)), (3, 3));
         let some = candidates(&setup, Some(Method::Lao), None, Some(Quadrature::Segment));
         assert!(some.len() == 7 && some.iter().all(|c| c.occlusion.quadrature == Quadrature::Segment));
         // Not every method has every rule; sets that a method does not list are tried where they are asked for.
-        let some = candidates(&setup, None, Some(RaySet::R54), Some(Quadrature::Segment));
-        assert_eq!((some.len(), count(&some, Method::Sweep)), (2, 1));
+        let some = candidates(&setup, None, Some(RaySet::R54), Some(Quadrature::Linear));
+        assert_eq!((some.len(), count(&some, Method::Rays)), (1, 1));
         assert_eq!(candidates(&setup, None, None, Some(Quadrature::Left)).len(), 7);
-        assert_eq!(candidates(&setup, Some(Method::Sweep), None, Some(Quadrature::Left)), []);
+        assert_eq!(candidates(&setup, Some(Method::Rays), None, Some(Quadrature::Left)), []);
     }
 
     /// What belongs to a phase is told by the phase, never by a name; and what is in none is not taken for nothing.
@@ -628,12 +630,12 @@ mod tests {
             stages.iter().for_each(|&(stage, ms)| timings.push(stage, ms));
             ambient_ms(&timings, 9.0)
         };
-        let renamed = Stage { name: "another name", ..stages::SWEEP };
-        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::CHOOSE, 0.5), (stages::SWEEP, 4.0)]), 4.5);
+        let renamed = Stage { name: "another name", ..stages::RAYS };
+        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::CHOOSE, 0.5), (stages::RAYS, 4.0)]), 4.5);
         assert_eq!(update(&[(stages::CARVE, 1.0), (stages::CHOOSE, 0.5), (renamed, 4.0)]), 4.5);
-        let lost = Stage { phase: Phase::Prepare, ..stages::SWEEP };
+        let lost = Stage { phase: Phase::Prepare, ..stages::RAYS };
         assert_eq!(update(&[(stages::CARVE, 1.0), (lost, 4.0)]), 9.0);
-        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::SWEEP, 0.0)]), 9.0);
+        assert_eq!(update(&[(stages::CARVE, 1.0), (stages::RAYS, 0.0)]), 9.0);
         assert_eq!(update(&[]), 9.0, "a queue without timestamps");
     }
 }

@@ -29,6 +29,12 @@ pub enum Marker {
     Square,
     /// ▲
     Triangle,
+    /// ▼
+    Down,
+    /// ▶
+    Right,
+    /// ◀
+    Left,
     /// ◆
     Diamond,
 }
@@ -113,6 +119,9 @@ impl Drawing {
         let corners: &[[f64; 2]] = match marker {
             Marker::Square => &[[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]],
             Marker::Triangle => &[[0.0, -1.2], [1.1, 0.8], [-1.1, 0.8]],
+            Marker::Down => &[[0.0, 1.2], [1.1, -0.8], [-1.1, -0.8]],
+            Marker::Right => &[[1.2, 0.0], [-0.8, 1.1], [-0.8, -1.1]],
+            Marker::Left => &[[-1.2, 0.0], [0.8, 1.1], [0.8, -1.1]],
             Marker::Circle | Marker::Diamond => &[[0.0, -1.25], [1.25, 0.0], [0.0, 1.25], [-1.25, 0.0]],
         };
         let mut d = String::new();

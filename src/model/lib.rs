@@ -6,7 +6,6 @@
 pub mod builtin;
 pub mod clip;
 pub mod error;
-pub mod lattice;
 pub mod look;
 pub mod mesh;
 pub mod methods;

@@ -11,8 +11,8 @@ pub enum Method {
     Lao,
     /// Contextual: only voxels that the clip affects; equal to [`Method::Lao`] bit for bit.
     Cao,
-    /// Line sweeps along lattice directions, only where opacities changed; equal to sweeping everything bit for bit.
-    Sweep,
+    /// Rays by brick in whole numbers, only where opacities changed; equal to computing everything bit for bit.
+    Rays,
 }
 
 /// What is known of a method, and how it is used unless one says otherwise.
@@ -34,24 +34,10 @@ pub struct Entry {
     pub quadratures: &'static [Quadrature],
     /// The ray sets that charts and the planner try, in the order of their cost; others are for who asks for them.
     pub sets: &'static [RaySet],
-    /// Where its samples lie along a ray.
-    pub samples: Samples,
     /// Whether an update computes only what a change affects; else everything.
     pub contextual: bool,
     /// The method whose values it has, bit for bit; itself where no other has them.
     pub same_values_as: Method,
-}
-
-/// Where samples lie along a ray (method.md §3, §4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Samples {
-    /// In equal steps from the voxel on: [`Occlusion::first`](crate::occlusion::Occlusion::first),
-    /// [`Occlusion::step`](crate::occlusion::Occlusion::step).
-    Steps,
-    /// In equal parts of each segment between the lattice's points: at most
-    /// [`Occlusion::lattice_step`](crate::occlusion::Occlusion::lattice_step) apart, from
-    /// [`Occlusion::lattice_offset`](crate::occlusion::Occlusion::lattice_offset) on.
-    Lattice,
 }
 
 /// Every method, the one to use first last.
@@ -63,9 +49,8 @@ pub static METHODS: &[Entry] = &[
         what: "all rays of every voxel, at every change",
         source: "CAO §3.4, eq. (2), (3)",
         rays: RaySet::R26,
-        quadratures: &Quadrature::ALL,
+        quadratures: &Quadrature::CAST,
         sets: &RaySet::ALL,
-        samples: Samples::Steps,
         contextual: false,
         same_values_as: Method::Lao,
     },
@@ -76,26 +61,28 @@ pub static METHODS: &[Entry] = &[
         what: "all rays of the voxels that a clip affects",
         source: "CAO §3.5",
         rays: RaySet::R26,
-        quadratures: &Quadrature::ALL,
+        quadratures: &Quadrature::CAST,
         sets: &RaySet::ALL,
-        samples: Samples::Steps,
         contextual: true,
         same_values_as: Method::Lao,
     },
     Entry {
-        method: Method::Sweep,
-        name: "sweep",
-        title: "Line sweeps",
-        what: "whole lines of voxels, where opacities changed",
-        source: "ours (method.md §4, §5)",
-        // Those that cost it least for their accuracy.
-        rays: RaySet::W26,
-        quadratures: &[Quadrature::Segment],
-        // Those with weights, and 6, whose weights are equal anyway.
-        sets: &[RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50],
-        samples: Samples::Lattice,
+        method: Method::Rays,
+        name: "rays",
+        title: "Rays by brick",
+        what: "rays of the bricks within reach of what changed",
+        source: "ours (method.md §4)",
+        rays: RaySet::Spiral(50),
+        quadratures: &Quadrature::BRICK,
+        sets: &[
+            RaySet::Spiral(14),
+            RaySet::Spiral(26),
+            RaySet::Spiral(50),
+            RaySet::Spiral(96),
+            RaySet::Spiral(192),
+        ],
         contextual: true,
-        same_values_as: Method::Sweep,
+        same_values_as: Method::Rays,
     },
 ];
 
@@ -164,11 +151,11 @@ mod tests {
 
     #[test]
     fn every_method_has_one_entry_and_is_found_by_its_name() {
-        for method in [Method::Lao, Method::Cao, Method::Sweep] {
+        for method in [Method::Lao, Method::Cao, Method::Rays] {
             assert_eq!(METHODS.iter().filter(|entry| entry.method == method).count(), 1);
             assert_eq!(Method::parse(method.name()), Ok(method));
         }
-        assert!(Method::parse("Sweep").is_err());
+        assert!(Method::parse("Rays").is_err());
     }
 
     #[test]
@@ -177,20 +164,16 @@ mod tests {
             assert!(entry.sets.contains(&entry.rays) && !entry.quadratures.is_empty(), "{}", entry.name);
             let like = entry.method.values().entry();
             assert_eq!(like.same_values_as, like.method, "{}: whose values are a third's", entry.name);
-            assert_eq!(
-                (like.samples, like.quadratures),
-                (entry.samples, entry.quadratures),
-                "{}",
-                entry.name
-            );
+            assert_eq!(like.quadratures, entry.quadratures, "{}", entry.name);
         }
     }
 
     #[test]
     fn who_names_no_method_gets_the_one_that_has_his_rule() {
-        assert_eq!(Method::default(), Method::Sweep);
-        assert_eq!(Method::for_rule(Some(Quadrature::Segment)), Method::Sweep);
-        assert_eq!(Method::for_rule(Some(Quadrature::Left)), Method::Cao);
-        assert_eq!(Method::for_rule(Some(Quadrature::Cell)), Method::Cao);
+        assert_eq!(Method::default(), Method::Rays);
+        for rule in Quadrature::ALL {
+            let method = if Quadrature::CAST.contains(&rule) { Method::Cao } else { Method::Rays };
+            assert_eq!(Method::for_rule(Some(rule)), method);
+        }
     }
 }

@@ -7,7 +7,8 @@ use glam::Vec3;
 ///
 /// The plain sets are the paper's (CAO §4: 6, 14, 26, 54 rays, equal weights); their directions are the lattice
 /// vectors that its authors' program uses, without its jitter. The weighted sets `…w` carry the weights of the
-/// Lebedev rules of degree 5, 7 and 11, which integrate the sphere exactly to that degree (method.md §4).
+/// Lebedev rules of degree 5, 7 and 11, which integrate the sphere exactly to that degree (method.md §2). Spirals have any even number
+/// of directions, see [`spiral`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RaySet {
     /// The 6 faces of a cube, equal weights.
@@ -24,15 +25,20 @@ pub enum RaySet {
     W26,
     /// Faces, edges, corners and (1,1,3) with the weights of degree 11.
     W50,
+    /// So many on a [`spiral`], equal weights: even, 2 … [`RaySet::MOST`].
+    Spiral(u8),
 }
 
 impl RaySet {
-    /// Every set, in the order of its cost.
+    /// Most directions of a set.
+    pub const MOST: u8 = 254;
+
+    /// Every set that has a name of its own, in the order of its cost.
     pub const ALL: [Self; 7] = [Self::R6, Self::R14, Self::W14, Self::R26, Self::W26, Self::W50, Self::R54];
 
-    /// Name on the command line and in scene files: `6`, `14`, `26`, `54`, `14w`, `26w`, `50w`.
-    pub fn name(self) -> &'static str {
-        match self {
+    /// Name on the command line and in scene files: `6`, `14`, `26`, `54`, `14w`, `26w`, `50w`, `spiral:50`.
+    pub fn name(self) -> String {
+        let name = match self {
             Self::R6 => "6",
             Self::R14 => "14",
             Self::R26 => "26",
@@ -40,21 +46,62 @@ impl RaySet {
             Self::W14 => "14w",
             Self::W26 => "26w",
             Self::W50 => "50w",
-        }
+            Self::Spiral(count) => return format!("spiral:{count}"),
+        };
+        name.into()
     }
 
     /// The set called `name`.
     pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|set| set.name() == name).ok_or_else(|| Error::Config {
-            what: "rays".into(),
-            problem: format!("\"{name}\" is no ray set; there are {}", Self::ALL.map(Self::name).join(", ")),
+        let set = match name.strip_prefix("spiral:") {
+            Some(count) => count.parse().ok().map(Self::Spiral).filter(|set| set.check().is_ok()),
+            None => Self::ALL.into_iter().find(|set| set.name() == name),
+        };
+        set.ok_or_else(|| {
+            let sets = Self::ALL.map(Self::name).join(", ");
+            let most = Self::MOST;
+            Error::refused(
+                "rays",
+                format!("\"{name}\" is no ray set; there are {sets} and spiral:N, N even, 2 … {most}"),
+            )
         })
     }
 
-    /// Lattice vectors and weights, Σ weights = 1, in the fixed order in which every implementation sums them.
-    ///
-    /// The direction of a ray is the vector's unit vector *in millimetres*, whatever the spacing.
-    pub fn directions(self) -> Vec<([i32; 3], f64)> {
+    fn check(self) -> Result<()> {
+        match self {
+            Self::Spiral(count) if count == 0 || count % 2 == 1 => Err(Error::refused(
+                "rays",
+                format!("spiral:{count}; expected an even number, 2 … {}", Self::MOST),
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Number of directions.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Spiral(count) => usize::from(count / 2 * 2),
+            named => named.lattice().len(),
+        }
+    }
+
+    /// Unit vectors *in millimetres*, whatever the spacing, and weights, Σ weights = 1, in the fixed order in which every implementation
+    /// sums them.
+    pub fn directions(self) -> Vec<([f64; 3], f64)> {
+        if let Self::Spiral(count) = self {
+            let all = spiral(count);
+            let weight = 1.0 / all.len() as f64;
+            return all.into_iter().map(|d| (d, weight)).collect();
+        }
+        let unit = |v: [i32; 3]| {
+            let length = f64::from(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+            v.map(|c| f64::from(c) / length)
+        };
+        self.lattice().into_iter().map(|(v, weight)| (unit(v), weight)).collect()
+    }
+
+    /// The vectors that the directions of a named set have, and weights; none of a spiral.
+    pub fn lattice(self) -> Vec<([i32; 3], f64)> {
         let orbits: &[([i32; 3], f64)] = match self {
             Self::R6 => &[([1, 0, 0], 1.0 / 6.0)],
             Self::R14 => &[([1, 0, 0], 1.0 / 14.0), ([1, 1, 1], 1.0 / 14.0)],
@@ -68,17 +115,15 @@ impl RaySet {
                 ([1, 1, 1], 27.0 / 1280.0),
                 ([3, 1, 1], 14641.0 / 725_760.0),
             ],
+            Self::Spiral(_) => &[],
         };
         orbits.iter().flat_map(|&(v, weight)| orbit(v).into_iter().map(move |d| (d, weight))).collect()
     }
 
-    /// Unit vectors in millimetre space and weights, as [`Self::directions`] orders them.
+    /// [`Self::directions`] in f32.
     pub fn unit_vectors(self) -> Vec<(Vec3, f32)> {
-        let unit = |v: [i32; 3]| {
-            let length = f64::from(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-            Vec3::from_array(v.map(|c| (f64::from(c) / length) as f32))
-        };
-        self.directions().into_iter().map(|(v, weight)| (unit(v), weight as f32)).collect()
+        let rounded = |(v, weight): ([f64; 3], f64)| (Vec3::from_array(v.map(|c| c as f32)), weight as f32);
+        self.directions().into_iter().map(rounded).collect()
     }
 }
 
@@ -97,7 +142,7 @@ fn orbit(v: [i32; 3]) -> Vec<[i32; 3]> {
     images
 }
 
-/// How a ray's samples become its ambient value (method.md §3).
+/// How a ray's samples become its ambient value (method.md §3, §4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quadrature {
     /// CAO eq. (2) as printed: each cell counts with its entry transmittance.
@@ -106,18 +151,32 @@ pub enum Quadrature {
     Cell,
     /// Opacity linear between consecutive samples, integrated with the segment's mean extinction.
     Segment,
+    /// Cells in whole numbers, the first few with trilinear opacity, the others with that of the nearest voxel.
+    Hybrid,
+    /// Cells in whole numbers with the opacity of the nearest voxel.
+    Nearest,
+    /// Cells in whole numbers with trilinear opacity.
+    Linear,
 }
 
 impl Quadrature {
     /// Every rule.
-    pub const ALL: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
+    pub const ALL: [Self; 6] =
+        [Self::Left, Self::Cell, Self::Segment, Self::Hybrid, Self::Nearest, Self::Linear];
+    /// Those of rays by the sampler, the paper's first.
+    pub const CAST: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
+    /// Those of rays by brick, the default first.
+    pub const BRICK: [Self; 3] = [Self::Hybrid, Self::Nearest, Self::Linear];
 
-    /// Name on the command line: `left`, `cell`, `segment`.
+    /// Name on the command line: `left`, `cell`, `segment`, `hybrid`, `nearest`, `linear`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
             Self::Cell => "cell",
             Self::Segment => "segment",
+            Self::Hybrid => "hybrid",
+            Self::Nearest => "nearest",
+            Self::Linear => "linear",
         }
     }
 
@@ -157,8 +216,9 @@ impl Occlusion {
         }
     }
 
-    /// Refuses lengths that are negative, not finite, or ask for more than [`Self::MAX_SAMPLES`] a ray.
+    /// Refuses lengths that are negative, not finite, or ask for more than [`Self::MAX_SAMPLES`] a ray, and spirals that there are none of.
     pub fn check(&self, min_spacing: f64) -> Result<()> {
+        self.rays.check()?;
         let length = |what: &str, value: Option<f32>, positive: bool| match value {
             Some(v) if !v.is_finite() || v < 0.0 || (positive && v == 0.0) => Err(Error::Config {
                 what: what.into(),
@@ -179,22 +239,6 @@ impl Occlusion {
             });
         }
         Ok(())
-    }
-
-    /// Distance in mm at which a lattice ray starts (method.md §4): by default half the smallest spacing, as other rays do.
-    pub fn lattice_offset(&self, min_spacing: f64) -> f32 {
-        self.offset_mm.unwrap_or((0.5 * min_spacing) as f32)
-    }
-
-    /// Largest distance in mm between samples of a lattice ray (method.md §4); by default every segment of the sets of up to 26
-    /// is one piece, √3 voxels long at most, where more pieces cost twice as much and gain little, and the segments of the larger
-    /// sets have samples up to 1.45 voxels apart, which takes a third off their error.
-    pub fn lattice_step(&self, min_spacing: f64) -> f32 {
-        let voxels = match self.rays {
-            RaySet::W50 | RaySet::R54 => 1.45,
-            _ => 1.75,
-        };
-        self.step_mm.unwrap_or((voxels * min_spacing) as f32)
     }
 
     /// Most samples of one ray; more has no use at any volume's size that a device holds.
@@ -289,6 +333,22 @@ impl Integral {
     }
 }
 
+/// `count` / 2 unit vectors on the upper half of the sphere, heights at the middles of equal steps, each turned by the golden angle from
+/// the last, and behind each its reverse: equal weights integrate every odd function exactly.
+pub fn spiral(count: u8) -> Vec<[f64; 3]> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let half = count / 2;
+    (0..half)
+        .flat_map(|i| {
+            let z = (f64::from(i) + 0.5) / f64::from(half);
+            let (sin, cos) = (f64::from(i) * golden).sin_cos();
+            let r = (1.0 - z * z).sqrt();
+            let d = [r * cos, r * sin, z];
+            [d, d.map(|c| -c)]
+        })
+        .collect()
+}
+
 /// `count` unit vectors spread evenly over the sphere: heights in equal steps, each turned by the golden angle from the
 /// last (González, Measurement of areas on a sphere using Fibonacci and latitude–longitude lattices, 2010).
 pub fn fibonacci(count: u32) -> Vec<[f64; 3]> {
@@ -312,7 +372,7 @@ mod tests {
         for set in RaySet::ALL {
             let directions = set.directions();
             let count: usize = set.name().trim_end_matches('w').parse().unwrap();
-            assert_eq!(directions.len(), count, "{}", set.name());
+            assert_eq!((directions.len(), set.count()), (count, count), "{}", set.name());
             let sum: f64 = directions.iter().map(|d| d.1).sum();
             assert!((sum - 1.0).abs() < 1e-14, "{} sums to {sum}", set.name());
         }
@@ -329,8 +389,7 @@ mod tests {
                 set.directions()
                     .iter()
                     .map(|&(v, w)| {
-                        let r = f64::from(v.map(|c| c * c).iter().sum::<i32>()).sqrt();
-                        let [x, y, z] = v.map(|c| f64::from(c) / r);
+                        let [x, y, z] = v;
                         w * x.powi(a) * y.powi(b) * z.powi(c)
                     })
                     .sum()
@@ -353,6 +412,35 @@ mod tests {
                 assert!(worst(d) < 1e-14, "{} at degree {d}: {}", set.name(), worst(d));
             }
             assert!(worst(degree + 1) > 1e-4, "{} would be exact beyond {degree}", set.name());
+        }
+    }
+
+    /// Of any even number; odd functions integrate to 0, and squares to a third.
+    #[test]
+    fn spirals_are_pairs_of_unit_vectors_that_integrate_squares() {
+        for count in [2, 14, 50, 96, 254] {
+            let set = RaySet::parse(&format!("spiral:{count}")).unwrap();
+            assert_eq!(set, RaySet::Spiral(count));
+            let all = set.directions();
+            assert_eq!((all.len(), set.count()), (count.into(), count.into()));
+            assert!((all.iter().map(|d| d.1).sum::<f64>() - 1.0).abs() < 1e-12);
+            for pair in all.chunks(2) {
+                assert!((pair[0].0.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-12);
+                assert_eq!(pair[0].0.map(|c| -c), pair[1].0);
+            }
+            for i in (0..3).filter(|_| count >= 50) {
+                let mean: f64 = all.iter().map(|(d, w)| w * d[i] * d[i]).sum();
+                assert!((mean - 1.0 / 3.0).abs() < 0.02, "{count} {i}: {mean}");
+            }
+        }
+        for bad in ["spiral:0", "spiral:7", "spiral:255", "spiral:256", "spiral:", "spiral", "spiral:-2"] {
+            let said = RaySet::parse(bad).unwrap_err().to_string();
+            assert!(said.contains(bad) && said.contains("spiral:N, N even, 2 … 254"), "{said}");
+        }
+        for count in [0, 51] {
+            let odd = Occlusion { rays: RaySet::Spiral(count), ..Occlusion::paper(1.0) };
+            assert!(odd.check(1.0).unwrap_err().to_string().starts_with("rays: spiral:"));
+            assert_eq!(odd.rays.directions().len(), odd.rays.count());
         }
     }
 

@@ -32,6 +32,23 @@ impl Setup {
         }
     }
 
+    /// Refuses lengths and rays that there are none of, and a rule that the method does not have.
+    ///
+    /// # Errors
+    /// As [`Occlusion::check`], and [`Error::Config`] naming the rule and those that there are.
+    pub fn check(&self, min_spacing: f64) -> Result<()> {
+        self.occlusion.check(min_spacing)?;
+        let (rule, entry) = (self.occlusion.quadrature, self.method.entry());
+        if self.method.has(rule) {
+            return Ok(());
+        }
+        let own: Vec<&str> = entry.quadratures.iter().map(|rule| rule.name()).collect();
+        Err(Error::refused(
+            "quadrature",
+            format!("{:?} is no rule of method {}, which has {}", rule.name(), entry.name, own.join(", ")),
+        ))
+    }
+
     /// The default method: what to use where the paper's numbers are not the point.
     pub fn new(min_spacing: f64) -> Self {
         Self::of(Method::default(), min_spacing)

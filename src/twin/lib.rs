@@ -10,7 +10,7 @@ pub mod clip;
 pub mod draw;
 pub mod field;
 pub mod measure;
-pub mod sweep;
+pub mod rays;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

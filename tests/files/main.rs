@@ -8,6 +8,5 @@ mod house;
 mod mesh;
 mod scene;
 mod shaders;
-mod sweep_simd;
 mod transfer;
 mod volume_files;

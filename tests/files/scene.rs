@@ -37,9 +37,9 @@ fn a_volume_is_enough() {
     let occlusion = scene.occlusion.setup(0.5).unwrap().occlusion;
     assert_eq!(
         (occlusion.radius_mm, occlusion.rays, occlusion.quadrature),
-        (10.0, RaySet::W26, Quadrature::Segment)
+        (10.0, RaySet::Spiral(50), Quadrature::Hybrid)
     );
-    assert_eq!((scene.occlusion.method, scene.occlusion.scope), (Method::Sweep, Scope::Needed));
+    assert_eq!((scene.occlusion.method, scene.occlusion.scope), (Method::Rays, Scope::Needed));
     // Every face of the volume is seen at its middle, by both eyes.
     for view in scene.stereo.rig([16.0; 3]).views(1.0, 0.1, 1e3).unwrap() {
         for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
@@ -57,8 +57,10 @@ fn method_rule_and_rays_follow_from_each_other() {
     for (text, expected) in [
         ("method = \"cao\"", (Method::Cao, RaySet::R26, Quadrature::Left)),
         ("quadrature = \"cell\"", (Method::Cao, RaySet::R26, Quadrature::Cell)),
-        ("quadrature = \"segment\"", (Method::Sweep, RaySet::W26, Quadrature::Segment)),
-        ("rays = 26", (Method::Sweep, RaySet::R26, Quadrature::Segment)),
+        ("quadrature = \"segment\"", (Method::Cao, RaySet::R26, Quadrature::Segment)),
+        ("quadrature = \"nearest\"", (Method::Rays, RaySet::Spiral(50), Quadrature::Nearest)),
+        ("rays = \"spiral:96\"", (Method::Rays, RaySet::Spiral(96), Quadrature::Hybrid)),
+        ("rays = 26", (Method::Rays, RaySet::R26, Quadrature::Hybrid)),
         ("method = \"lao\"\nquadrature = \"segment\"", (Method::Lao, RaySet::R26, Quadrature::Segment)),
     ] {
         let found = with(&format!("[occlusion]\n{text}")).occlusion;
@@ -262,7 +264,7 @@ fn impossible_values_are_refused_by_name() {
         ("[occlusion]\nrays = 7", "occlusion.rays: \"7\" is no ray set"),
         ("[occlusion]\nrays = [26]", "occlusion.rays: "),
         ("[occlusion]\nquadrature = \"simpson\"", "occlusion.quadrature: \"simpson\" is no rule"),
-        ("[occlusion]\nmethod = \"ssao\"", "occlusion.method: \"ssao\": expected lao, cao, sweep"),
+        ("[occlusion]\nmethod = \"ssao\"", "occlusion.method: \"ssao\": expected lao, cao, rays"),
         ("[occlusion]\nscope = \"some\"", "occlusion.scope: \"some\": expected needed or all"),
         ("[stereo]\nipd_mm = -1", "stereo.ipd_mm: -1: expected a length >= 0 mm"),
         ("[stereo]\nscreen_mm = 0", "stereo.screen_mm: 0: expected a length > 0 mm"),

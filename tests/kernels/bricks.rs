@@ -2,7 +2,7 @@
 
 use cao::field::Field;
 use cao::field::bricks::{BrickList, Bricks, Which};
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao_gpu::{Access, Gpu};
 use cao_measure::random::Random;
 use cao_testing::*;

@@ -5,7 +5,7 @@ use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao_gpu::{Access, Format, Gpu};
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};

@@ -7,7 +7,7 @@ use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
 use cao::field::Field;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::exactness;

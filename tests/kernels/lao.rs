@@ -2,10 +2,10 @@
 
 use cao::cast::lao::{Bindings, Work};
 use cao::cast::volumes::{Kernels, Volumes};
-use cao::drive::{self, Part};
+use cao::drive::{self, Pace, Part};
 use cao::field::Field;
-use cao::field::bricks::{BrickList, Which};
-use cao::host::volume_image;
+use cao::field::bricks::Which;
+use cao::field::volume_image;
 use cao::stages::{BRICKS, LAO};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;
@@ -69,7 +69,7 @@ impl<'a> Bench<'a> {
             Ok(k.bricks.record(rec, field, which, opacity, mask, &v.changed_before, &v.list)?)
         });
         // So few at first that there are several parts.
-        let rays = Part::items(LAO, (&v.list.buffer, BrickList::COUNT_AT), 5, move |rec, items| {
+        let rays = Part::items(LAO, v.list.items(field), 5, move |rec, items| {
             match items {
                 None => k.lao.record(rec, field, occlusion, *reference_mm, *scope, Work::Full, b)?,
                 Some(items) => {
@@ -97,7 +97,7 @@ impl<'a> Bench<'a> {
         let out = self.out();
         run(self.gpu, |rec| self.kernels.lao.record_rays(rec, &settings.occlusion).unwrap());
         let mut last = 0.0;
-        drive::run(self.gpu, &self.parts(opacity, &out, settings), &mut |part| {
+        drive::run(self.gpu, &self.parts(opacity, &out, settings), &mut Pace::default(), &mut |part| {
             assert!(part >= last && part <= 1.0);
             last = part;
         })
@@ -180,7 +180,7 @@ fn every_ray_set_and_rule_at_every_length_and_size() {
         let opacity = opacities(&mut random, grid, LARGEST);
         let image = float_image(&gpu, &bench.field, &opacity);
         for rays in RaySet::ALL {
-            for quadrature in Quadrature::ALL {
+            for quadrature in Quadrature::CAST {
                 // All lengths with each set and rule on the small odd size, two of them in turn on the others.
                 for _ in 0..if g == 3 { LENGTHS.len() } else { 2 } {
                     let (occlusion, reference_mm) = occlusion(rays, quadrature, turn, grid.min_spacing());
@@ -225,7 +225,7 @@ fn opaque_blocks() {
             }
         }
         let image = float_image(&gpu, &bench.field, &opacity);
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             let occlusion = Occlusion {
                 rays: RaySet::W50,
                 quadrature,
@@ -263,7 +263,7 @@ fn needed_voxels_have_the_same_bits_and_the_others_one() {
             opacity[random.below(grid.len() as u64) as usize] = random.between(0.01, 1.0);
         }
         let image = float_image(&gpu, &bench.field, &opacity);
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             let (occlusion, reference_mm) = occlusion(RaySet::R26, quadrature, 0, grid.min_spacing());
             let all = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
             let every = bench.run(&image, &all);
@@ -291,7 +291,7 @@ fn parts_and_one_indirect_dispatch_give_the_same_bits() {
     let bench = Bench::new(&gpu, &kernels, &grid);
     let opacity = opacities(&mut random, &grid, 1.0);
     let image = float_image(&gpu, &bench.field, &opacity);
-    for (quadrature, scope) in Quadrature::ALL.into_iter().zip([Scope::All, Scope::Needed, Scope::All]) {
+    for (quadrature, scope) in Quadrature::CAST.into_iter().zip([Scope::All, Scope::Needed, Scope::All]) {
         let (occlusion, reference_mm) = occlusion(RaySet::R54, quadrature, 4, grid.min_spacing());
         let settings = Settings { occlusion, scope, reference_mm: reference_mm as f32 };
         let parts: Vec<u32> = bench.run(&image, &settings).into_iter().map(f32::to_bits).collect();

@@ -165,6 +165,7 @@ fn every_ray_set_and_rule_meets_its_closed_form_in_a_uniform_volume() {
         ("14w", "cell", left * (1.0 + q) / 2.0),
         ("26w", "segment", segment),
         ("50w", "left", left),
+        ("spiral:50", "segment", segment),
     ] {
         let answer = folder.json(&format!(
             "occlusion builtin:uniform:9 --transfer tenth.toml --radius-mm 3 --rays {rays} --quadrature {rule} -o ao.nrrd"
@@ -311,7 +312,7 @@ fn a_scene_is_drawn_for_both_eyes_side_by_side_and_one_by_one() {
             assert!(answer["stages_ms"][stage].as_f64().is_some_and(|ms| ms > 0.0), "{stage}: {answer}");
         }
     };
-    has_stages(&answer, &["carve", "choose", "sweep", "raycast"]);
+    has_stages(&answer, &["carve", "choose", "rays", "raycast"]);
     // A rule of the paper asks for the paper's method.
     for flags in ["--method cao", "--quadrature left"] {
         let answer = folder.json(&format!("render scene.toml {flags} -o cao.png"));
@@ -364,8 +365,8 @@ fn a_budget_chooses_among_what_the_flags_leave_open_and_says_what_it_measured() 
     let scene = "occlusion builtin:engine:24 --radius-mm 5 --needed-only --clip sphere --clip-scale 8";
     for (limits, budget, tried) in [
         ("--method lao --rays 26w", "--budget-error 0.5", 3),
-        ("--rays 14w --quadrature segment", "--budget-ms 1e5", 2),
-        ("--method sweep", "--budget-error 0.5", 4),
+        ("--rays 14w --quadrature segment", "--budget-ms 1e5", 1),
+        ("--method rays --quadrature hybrid", "--budget-error 0.5", 5),
     ] {
         let answer = folder.json(&format!("{scene} {limits} {budget} -o chosen.nrrd"));
         let planned = &answer["planned"];
@@ -483,14 +484,14 @@ fn stability_writes_data_charts_and_one_page_with_all_of_them() {
     let folder = Folder::with_device();
     let answer = folder.json("stability --quick --only concave,anisotropy -o new/found");
     assert_eq!(answer["good"], true, "{answer}");
-    let sweeps = answer["sweeps"].as_array().unwrap();
-    assert_eq!(sweeps.len(), 2);
+    let trials = answer["trials"].as_array().unwrap();
+    assert_eq!(trials.len(), 2);
     let page = std::fs::read_to_string(folder.path("new/found/index.html")).unwrap();
     assert_eq!(page.matches("<svg").count(), 2);
-    for sweep in sweeps {
-        let name = sweep["name"].as_str().unwrap();
-        assert_eq!((&sweep["ours"], &sweep["control_fails"]), (&"holds".into(), &true.into()), "{sweep}");
-        assert!(page.contains(sweep["sentence"].as_str().unwrap()), "{name}");
+    for trial in trials {
+        let name = trial["name"].as_str().unwrap();
+        assert_eq!((&trial["ours"], &trial["control_fails"]), (&"holds".into(), &true.into()), "{trial}");
+        assert!(page.contains(trial["sentence"].as_str().unwrap()), "{name}");
         let file = |end: &str| std::fs::read(folder.path(&format!("new/found/{name}{end}"))).unwrap();
         assert!(file("-1.png").starts_with(b"\x89PNG"));
         assert!(String::from_utf8(file("-1.svg")).unwrap().contains("<svg"));
@@ -498,4 +499,26 @@ fn stability_writes_data_charts_and_one_page_with_all_of_them() {
     }
     let list = folder.ok("stability --list");
     assert_eq!(list.lines().count(), 10, "{list}");
+}
+
+/// `verify` without a method proves the default and the paper's claim; `all` is the list.
+#[test]
+fn verify_reports_every_method_that_it_was_asked_for() {
+    let folder = Folder::with_device();
+    let methods = |flags: &str| -> Vec<String> {
+        let answer = folder.json(&format!("verify builtin:fruit:16 --poses 1 --shapes sphere {flags}"));
+        assert_eq!(answer["exact"], true, "{answer}");
+        let reports = answer["volumes"].as_array().unwrap().iter();
+        reports.map(|report| report["method"].as_str().unwrap().to_owned()).collect()
+    };
+    let listed: Vec<String> = cao_model::methods::Method::names().into_iter().map(str::to_owned).collect();
+    assert_eq!(methods("--method all"), listed);
+    for name in &listed {
+        assert_eq!(methods(&format!("--method {name}")), [name.as_str()]);
+    }
+    let mut usual = methods("");
+    usual.sort();
+    let mut wanted = vec!["cao".to_owned(), cao_model::methods::Method::default().name().to_owned()];
+    wanted.sort();
+    assert_eq!(usual, wanted);
 }

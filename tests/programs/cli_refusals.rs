@@ -235,7 +235,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
     for (flags, parts) in [
         ("--rays 27", &["--rays", "27", "26w"][..]),
         ("--quadrature simpson", &["--quadrature", "segment"]),
-        ("--method ssao", &["--method", "lao, cao, sweep"]),
+        ("--method ssao", &["--method", "lao, cao, rays"]),
         ("--radius-mm -1", &["--radius-mm", "-1", ">= 0 mm"]),
         ("--radius-mm nan", &["--radius-mm", ">= 0 mm"]),
         ("--radius-mm wide", &["--radius-mm", ">= 0 mm"]),
@@ -282,8 +282,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
         ("verify builtin:engine:8 --poses 4294967295", &["--poses"]),
         ("verify builtin:engine:8 --seed -1", &["--seed"]),
         ("verify builtin:engine:8 --shapes pyramid", &["pyramid"]),
-        // Both methods are what it compares.
-        ("verify builtin:engine:8 --method lao", &["--method"]),
+        ("verify builtin:engine:8 --method ssao", &["--method", "all"]),
         ("info", &["<INPUT>"]),
         ("devices all", &["all"]),
     ] {
@@ -353,7 +352,7 @@ fn without_a_device_the_user_is_told_how_to_get_one() {
 }
 
 #[test]
-fn stability_asks_for_a_folder_and_for_sweeps_that_there_are() {
+fn stability_asks_for_a_folder_and_for_trials_that_there_are() {
     let folder = Folder::without_device();
     folder.put("taken", "a file");
     refused(&folder, "stability", USAGE, &["--output"]);

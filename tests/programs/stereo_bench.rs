@@ -4,7 +4,7 @@
 use crate::support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 
-const METHODS: [&str; 5] = ["solid", "lao", "cao", "cao-literal", "sweep"];
+const METHODS: [&str; 5] = ["solid", "lao", "cao", "cao-literal", "rays"];
 
 /// The smallest run that has percentiles and runs to compare.
 const TINY: &str = "builtin:engine:16 --radius-mm 3 --rays 6 --size 32x24 --frames 3 --runs 2 --warm-up 1";
@@ -69,15 +69,15 @@ fn check_method(method: &Value, name: &str, table: &Table) {
         let wall = table.number(row, "frame_ms");
         assert!(sum >= wall - 1e-3 && sum < 1.1 * wall + 0.1, "{name}: {sum} of {wall}");
     }
-    assert_eq!(method["quadrature"], if name == "sweep" { "segment" } else { "left" });
+    assert_eq!(method["quadrature"], if name == "rays" { "hybrid" } else { "left" });
     let stages = method["stages_ms"].as_object().unwrap();
     for (stage, there) in [
-        ("classify", name != "sweep"),
-        ("carve", name == "sweep"),
+        ("classify", name != "rays"),
+        ("carve", name == "rays"),
         ("raycast", true),
         ("lao", name == "lao"),
-        ("contextual", !["lao", "sweep"].contains(&name)),
-        ("sweep", name == "sweep"),
+        ("contextual", !["lao", "rays"].contains(&name)),
+        ("rays", name == "rays"),
         ("opacity", false),
     ] {
         assert_eq!(stages.contains_key(stage), there, "{name}: {stage} in {stages:?}");
@@ -183,7 +183,7 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid lao cao cao-literal sweep, rays 6"),
+        ("method", "solid lao cao cao-literal rays, rays 6"),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),
@@ -291,7 +291,7 @@ fn what_cannot_be_measured_is_refused_before_a_device_is_asked_for() {
     folder.put("cube.nrrd", nrrd("uchar", "2 2 2", "1 1 1", &[0, 50, 100, 150, 200, 250, 20, 30]));
     for (arguments, code, words) in [
         ("--views 3", 2, "expected 1, 2 or 4"),
-        ("--methods lao,vray", 2, "expected one of solid, lao, cao, cao-literal, sweep"),
+        ("--methods lao,vray", 2, "expected one of solid, lao, cao, cao-literal, rays"),
         ("--methods lao,lao", 2, "lao is given twice"),
         ("--scale colour", 2, "expected one of size, rays, radius, resolution, views"),
         ("--scale rays,rays", 2, "rays is given twice"),

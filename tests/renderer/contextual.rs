@@ -70,7 +70,7 @@ fn values_are_those_of_the_twin_after_every_edit() {
         let full = opacities(&mut random, grid, 0.9);
         let smallest = grid.min_spacing() as f32;
         let occlusion =
-            Occlusion { quadrature: Quadrature::ALL[g % 3], radius_mm: 3.0 * smallest, ..SETUP.occlusion };
+            Occlusion { quadrature: Quadrature::CAST[g % 3], radius_mm: 3.0 * smallest, ..SETUP.occlusion };
         let setup = Setup { occlusion, ..SETUP };
         let volume = volume_of(grid, full.clone());
         let mut renderer = Renderer::new(&gpu, &volume, identity(), setup, COLOUR).unwrap();

@@ -90,8 +90,10 @@ impl Scene {
                 match random.below(5) {
                     0 => next.occlusion.radius_mm = random.between(0.0, 18.0) * smallest,
                     1 => {
-                        next.occlusion.rays =
-                            [RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50][pick(random, 4)]
+                        let sets = [RaySet::R6, RaySet::W14, RaySet::W26, RaySet::Spiral(20)];
+                        next.occlusion.rays = sets[pick(random, 4)];
+                        let rules = next.method.entry().quadratures;
+                        next.occlusion.quadrature = rules[pick(random, rules.len())];
                     }
                     2 => {
                         let share = random.between(0.0, 0.9) * smallest;

@@ -126,8 +126,8 @@ fn a_frame_that_was_dropped_is_made_good_after_invalidate() {
             own.set_clips(&clips).unwrap();
             own.update(&mut |_| ()).unwrap();
             assert_eq!(hosted.read_opacity().unwrap(), own.read_opacity().unwrap());
-            // That of sweeps says what the last update computed: there everything.
-            if method != Method::Sweep {
+            // That of rays by brick says what the last update computed: there everything.
+            if method != Method::Rays {
                 assert_eq!(hosted.read_mask().unwrap(), own.read_mask().unwrap());
             }
             let ambient = |r: &Renderer| bits(r.read_ambient().unwrap());
@@ -193,5 +193,50 @@ fn what_is_out_of_date_is_neither_drawn_nor_read() {
         }
         drop((r, colour, depth));
     }
+    cao_testing::close(gpu);
+}
+
+/// What a frame of the default method asks of Vulkan, whatever changed: one submission once its pace is known, and few commands.
+#[test]
+fn an_update_is_one_submission_of_few_commands() {
+    const COMMANDS: u64 = 40;
+    let gpu = cao_testing::open();
+    let volume = cao_formats::open("builtin:engine:24").unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut setup = Setup::new(volume.min_spacing());
+    // Far from a tenth of a second on any device.
+    setup.occlusion.radius_mm = 3.0;
+    let mut r = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
+    r.update(&mut |_| ()).unwrap();
+    type Change<'a> = &'a dyn Fn(&mut Renderer);
+    let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+    let prepared = [clip(mesh, 2.0)];
+    r.set_clips(&prepared).unwrap();
+    let changes: [(&str, Change); 5] = [
+        ("a mesh", &|r| r.set_clips(&prepared).unwrap()),
+        ("a sphere", &|r| r.set_clips(&[clip(Shape::Sphere, 5.0)]).unwrap()),
+        ("it moved", &|r| r.set_clips(&[clip(Shape::Sphere, 4.0)]).unwrap()),
+        ("another transfer function", &|r| r.set_transfer(transfer.clone()).unwrap()),
+        ("everything", &Renderer::invalidate),
+    ];
+    for (what, change) in changes {
+        change(&mut r);
+        let before = gpu.counts();
+        r.update(&mut |_| ()).unwrap();
+        let asked = gpu.counts() - before;
+        assert_eq!(asked.submissions, 1, "{what}: {asked:?}");
+        assert!(asked.commands <= COMMANDS && asked.calls < 6 * COMMANDS, "{what}: {asked:?}");
+
+        change(&mut r);
+        let mut rec = gpu.recorder("host frame").unwrap();
+        r.record_update(&mut rec).unwrap();
+        let recorded = rec.counts();
+        assert!((1..=COMMANDS).contains(&recorded.commands), "{what}: {recorded:?}");
+        rec.submit_and_wait().unwrap();
+    }
+    let before = gpu.counts();
+    r.update(&mut |_| ()).unwrap();
+    assert_eq!(gpu.counts(), before, "nothing changed");
+    drop(r);
     cao_testing::close(gpu);
 }

@@ -86,7 +86,7 @@ fn taken(renderer: &mut Renderer, candidate: Candidate) -> f64 {
         .map(|_| {
             renderer.invalidate();
             let timings = renderer.update(&mut |_| ()).unwrap();
-            timings.iter().filter(|t| [stages::LAO, stages::SWEEP].contains(&t.stage)).map(|t| t.ms).sum()
+            timings.iter().filter(|t| [stages::LAO, stages::RAYS].contains(&t.stage)).map(|t| t.ms).sum()
         })
         .collect();
     times.sort_by(f64::total_cmp);

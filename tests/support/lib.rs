@@ -6,7 +6,7 @@
 pub mod wgsl;
 
 use cao::field::Field;
-use cao::host::volume_image;
+use cao::field::volume_image;
 use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};

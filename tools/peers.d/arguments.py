@@ -12,7 +12,7 @@ cao and VTK beside each other: tools/peers [VOLUME=builtin:engine:128] [options]
 
 Times both eyes after each move of a clip plane along the path of stereo-bench: VTK plain,
 with volumetric scattering, with screen-space occlusion; cao in solid colour, with full
-and with contextual updates, by rays and by sweeps. Same opacities, cameras, light and
+and with contextual updates, by rays and by rays by brick. Same opacities, cameras, light and
 step; rounds alternate.
 Then: how far VTK's occlusion differs between the eyes, and whether its shadows know of a
 clip. The first run downloads VTK (140 MB, into target/peers).

@@ -20,7 +20,7 @@ OURS = {
     "solid": "solid colour",
     "lao": "LAO, full update",
     "cao": "CAO, contextual update",
-    "sweep": "line sweeps, contextual update",
+    "rays": "rays by brick, contextual update",
 }
 # The isosurface whose screen-space occlusion is compared between the eyes: half of full opacity.
 LEVEL = 0.5

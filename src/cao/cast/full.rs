@@ -3,12 +3,11 @@
 use super::volumes::{Kernels, Volumes};
 use super::{classified, local, unclipped};
 use crate::Result;
-use crate::drive::{self, Part};
+use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation, Recomputed};
+use crate::drive::{self, Pace, Part};
 use crate::field::bricks::BrickList;
-use crate::method::{Ambient, Categories, Changed, Fields, Recomputation};
 use crate::stages;
 use crate::subject::Subject;
-use crate::verify::compare::Recomputed;
 use cao_gpu::{Image, Timings};
 
 /// The method `lao`.
@@ -64,7 +63,7 @@ pub(super) fn recompute<'a>(
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Recomputation<'a>, Timings)> {
     let parts = local(k, v, on, (&v.opacity, into), [stages::BRICKS, stages::LAO]);
-    let timings = drive::run(&on.gpu, &parts, progress)?;
+    let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
     let list = BrickList { buffer: v.list.buffer.clone() };
     Ok((Recomputation { list, recomputed: Recomputed::Mask(&v.mask) }, timings))
 }

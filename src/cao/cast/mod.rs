@@ -5,13 +5,13 @@ pub mod full;
 pub mod lao;
 pub mod volumes;
 
+use crate::ambient::Changed;
 use crate::cast::lao::{Bindings, Work};
 use crate::cast::volumes::{Kernels, Volumes};
 use crate::clip::classify::Classify;
 use crate::drive::Part;
 use crate::field::BRICK;
-use crate::field::bricks::{BrickList, Which};
-use crate::method::Changed;
+use crate::field::bricks::Which;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Access, Image, Stage};
@@ -29,7 +29,7 @@ pub(crate) fn map_radius(on: &Subject) -> f32 {
 fn unclipped<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
     let mut parts = Vec::new();
     if changed.anew {
-        parts.push(Part::short(stages::RAYS, |rec| Ok(k.lao.record_rays(rec, &on.setup.occlusion)?)));
+        parts.push(Part::short(stages::DIRECTIONS, |rec| Ok(k.lao.record_rays(rec, &on.setup.occlusion)?)));
     }
     if changed.opacities {
         parts.push(Part::short(stages::OPACITY, |rec| {
@@ -96,10 +96,10 @@ fn over_bricks<'a>(k: &'a Kernels, on: &'a Subject, stage: Stage, work: Work, b:
     let (field, setup) = (&on.field, &on.setup);
     // The first slice is small enough for any device.
     let brick_samples = f64::from(BRICK.pow(3))
-        * setup.occlusion.rays.directions().len() as f64
+        * setup.occlusion.rays.count() as f64
         * f64::from(setup.occlusion.samples(f64::from(field.min_spacing())).max(1));
     let first = (4e6 / brick_samples).clamp(1.0, 1e6) as u32;
-    Part::items(stage, (&b.list.buffer, BrickList::COUNT_AT), first, move |rec, items| {
+    Part::items(stage, b.list.items(field), first, move |rec, items| {
         let (occlusion, reference_mm, scope) = (&setup.occlusion, on.reference_mm(), setup.scope);
         match items {
             None => k.lao.record(rec, field, occlusion, reference_mm, scope, work, b)?,
@@ -108,7 +108,11 @@ fn over_bricks<'a>(k: &'a Kernels, on: &'a Subject, stage: Stage, work: Work, b:
                 k.lao.record_part(rec, field, occlusion, reference_mm, scope, work, b, base, count)?;
             }
         }
-        rec.barrier(&[Access::StorageWrite], &[Access::SampledRead, Access::TransferWrite]);
+        // What follows V_PAO writes the mask that these rays may have read, and another list.
+        rec.barrier(
+            &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
+            &[Access::SampledRead, Access::StorageWrite, Access::TransferWrite],
+        );
         Ok(())
     })
 }

@@ -1,13 +1,14 @@
 //! The full-size volumes that methods read and write, and the kernels that fill them.
 
+use crate::ambient::{Categories, Fields};
 use crate::cast::lao::Lao;
 use crate::clip::classify::Classify;
 use crate::clip::clip_bricks::ClipBricks;
 use crate::field::Field;
 use crate::field::bricks::{BrickList, Bricks};
 use crate::field::opacity::Opacity;
-use crate::host::{read_buffer, read_texels, volume_image};
-use crate::method::{Categories, Fields};
+use crate::field::volume_image;
+use crate::host::{read_buffer, read_texels};
 use crate::subject::Subject;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image};

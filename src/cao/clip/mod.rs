@@ -1,5 +1,6 @@
 //! Clips: depth layers and dilation maps of meshes, classification of bricks and voxels.
 
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;

@@ -4,6 +4,7 @@
 //! In: `opacity` (for [`Which::Needed`]), `mask` and `changed_before` (for [`Which::Changed`]). Out: `list`. Cost: at most
 //! two reads a voxel.
 
+use crate::drive::Items;
 use crate::field::Field;
 use crate::host::{device_buffer, row_of_groups, same_layout};
 use cao_gpu::Result;
@@ -54,6 +55,11 @@ impl BrickList {
         let head = Head { groups_x, groups_y, groups_z, count };
         let content = [bytemuck::bytes_of(&head), bytemuck::cast_slice(bricks)].concat();
         Ok(Self { buffer: device_buffer(gpu, "brick list", &content)? })
+    }
+
+    /// As a part of an update works on it.
+    pub fn items(&self, field: &Field) -> Items<'_> {
+        Items { count: &self.buffer, at: Self::COUNT_AT, most: field.brick_count() }
     }
 
     /// Empties the list, for a kernel that fills it.

@@ -5,6 +5,7 @@
 //! f32, the one loss there is. Devices need not filter 16-bit UNORM texels; where one cannot, 16-bit values become f32 texels.
 
 pub mod bricks;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;
 pub mod transfer;
@@ -142,6 +143,12 @@ fn texels(volume: &Volume, format: Format, range: std::ops::Range<usize>) -> Vec
         }
         _ => range.flat_map(|i| (volume.value(i) as f32).to_ne_bytes()).collect(),
     }
+}
+
+/// A 3D image of the field's size that kernels sample and store to.
+pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> cao_gpu::Result<Image> {
+    let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
+    gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
 }
 
 #[cfg(test)]

@@ -2,10 +2,11 @@
 //!
 //! In: `expected`, `actual` (3D r32float or r16unorm), `mask` or `todo`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
 
+use crate::ambient::Recomputed;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use cao_gpu::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline};
+use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline};
 use cao_kernels::compare as kernel;
 use cao_model::settings::Scope;
 
@@ -20,15 +21,6 @@ pub struct Difference {
     pub largest: f32,
     /// Of the compared, voxels that the contextual update recomputed.
     pub recomputed: u64,
-}
-
-/// How it is known which voxels were recomputed.
-#[derive(Clone, Copy)]
-pub enum Recomputed<'a> {
-    /// V_m; clipped voxels that touch no visible one have no value.
-    Mask(&'a Image),
-    /// A u32 a brick, [`TODO`](cao_kernels::compare::TODO) where they were.
-    Bricks(&'a Buffer),
 }
 
 /// The kernel `compare`.

@@ -2,8 +2,9 @@
 
 use crate::cast::lao::{Bindings, Lao, Work};
 use crate::field::bricks::BrickList;
+use crate::field::volume_image;
 use crate::field::{BRICK, Field};
-use crate::host::{read_values, volume_image};
+use crate::host::read_values;
 use crate::renderer::Renderer;
 use cao_gpu::Result;
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage};

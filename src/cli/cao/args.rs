@@ -1,4 +1,4 @@
-//! Flags and their meaning, one place for all commands. Those that the programs share are in `common`.
+//! Flags and their meaning, one place for all commands. Those that the programs share are in [`cao_cli::args`].
 
 use anyhow::{Context, Result};
 pub use cao_cli::args::{Global, Raw, Settings, open, setup, shape, usage};

@@ -3,9 +3,9 @@
 use super::path;
 use super::way::Way;
 use anyhow::{Context, Result};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_gpu::{Access, Counts, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
 use cao_measure::split::Split;
 use cao_model::clip::Shape;
 use cao_model::settings::Setup;
@@ -58,6 +58,10 @@ pub struct Frame {
     pub stages: Timings,
     /// What the clip did to the voxels.
     pub categories: Categories,
+    /// Time in which the processor recorded the update.
+    pub recording: f64,
+    /// What the update asks of Vulkan.
+    pub asked: Counts,
 }
 
 /// The parts of a frame as the paper names them (CAO Fig. 9), and what no stage accounts for.
@@ -191,13 +195,15 @@ impl<'a> Runner<'a> {
         let start = Instant::now();
         self.move_clip(plan, frame)?;
         let mut rec = gpu.recorder("frame")?;
+        let before = Instant::now();
         self.renderer.record_update(&mut rec)?;
+        let (recording, asked) = (before.elapsed().as_secs_f64() * 1e3, rec.counts());
         let Target { colour, depth } = &*self.target;
         self.renderer.record_draw(&mut rec, &views, &look, colour, depth, *size)?;
         let stages = rec.submit_and_wait()?;
         let wall = start.elapsed().as_secs_f64() * 1e3;
 
-        Ok(Frame { wall, stages, categories: self.renderer.categories()? })
+        Ok(Frame { wall, stages, categories: self.renderer.categories()?, recording, asked })
     }
 }
 
@@ -211,7 +217,13 @@ mod tests {
         let frame =
             [(cao::stages::CLASSIFY, 1.0), (cao::stages::CONTEXTUAL, 4.5), (cao::stages::RAYCAST, 2.0)];
         frame.into_iter().for_each(|(stage, ms)| stages.push(stage, ms));
-        let mut frame = Frame { wall: 8.0, stages, categories: Categories::default() };
+        let mut frame = Frame {
+            wall: 8.0,
+            stages,
+            categories: Categories::default(),
+            recording: 0.0,
+            asked: Counts::default(),
+        };
         assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
         // Clocks of device and host may disagree by a little; no time is negative.
         frame.wall = 7.0;

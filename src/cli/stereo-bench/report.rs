@@ -81,7 +81,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line("            speed-up: LAO's time over the method's, median of the frames' ratios (the paper's Table 3)".into());
     }
     line(
-        "            affected: share of the voxels near what the clip changed, of sweeps in whole bricks, mean (the paper's Table 2)"
+        "            affected: share of the voxels near what the clip changed, of rays by brick in whole ones, mean (the paper's Table 2)"
             .into(),
     );
     line(String::new());
@@ -95,6 +95,22 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line(format!("{:<12}{}", m.method.name(), cells.map(|cell| format!("{cell:>20}")).concat()));
     }
     line("            medians, and their share of the median frame (the paper's Fig. 9)".into());
+    line(String::new());
+    line(format!(
+        "{:<12}{:>20}{:>20}{:>20}{:>20}",
+        "update, host", "recording, ms", "commands", "barriers", "calls"
+    ));
+    for m in all {
+        let of = |of: fn(&Frame) -> f64| median(&m.frames().map(of).collect::<Vec<_>>());
+        let ms = of(|frame| frame.recording);
+        let [commands, barriers, calls] = [
+            of(|frame| frame.asked.commands as f64),
+            of(|frame| frame.asked.barriers as f64),
+            of(|frame| frame.asked.calls as f64),
+        ];
+        line(format!("{:<12}{ms:>20.3}{commands:>20}{barriers:>20}{calls:>20}", m.method.name()));
+    }
+    line("            medians; one submission a frame, which the host makes".into());
     if all.iter().any(|m| m.frames().any(|frame| frame.stages.is_empty())) {
         line("            this device has no timestamps: all of a frame is overhead".into());
     }
@@ -199,6 +215,9 @@ fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
         "run_medians_ms": run_medians(m),
         "lao_over_this": speedup(m, all),
         "affected_share": affected(m),
+        "recording_ms": median(&m.frames().map(|frame| frame.recording).collect::<Vec<_>>()),
+        "commands": median(&m.frames().map(|frame| frame.asked.commands as f64).collect::<Vec<_>>()),
+        "calls": median(&m.frames().map(|frame| frame.asked.calls as f64).collect::<Vec<_>>()),
         "parts_ms": parts,
         "stages_ms": stages(m),
     })

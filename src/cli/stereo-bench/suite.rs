@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use cao_cli::args::{open, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use cao_gpu::DeviceKind;
-use cao_model::methods::{Method, Samples};
+use cao_model::methods::Method;
 use serde_json::{Map, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -89,14 +89,6 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
-    let setups = plan.methods.iter().map(|way| (way, way.setup(*setup)));
-    for (way, own) in setups.filter(|(_, own)| own.method.entry().samples == Samples::Lattice) {
-        let (o, spacing) = (own.occlusion, input.volume.min_spacing());
-        let (rule, step, from) = (o.quadrature.name(), o.lattice_step(spacing), o.lattice_offset(spacing));
-        out.line(format!(
-            "          of {way} quadrature {rule}, samples at most {step} mm apart, from {from} mm on"
-        ));
-    }
     out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
     out.line(format!("clip      {}", cli.clip));
     out.line(match cli.all_voxels {

@@ -88,11 +88,11 @@ mod tests {
     #[test]
     fn names_stay_and_every_method_is_there() {
         let names: Vec<_> = Way::all().into_iter().map(Way::name).collect();
-        assert_eq!(names, ["solid", "lao", "cao", "cao-literal", "sweep"]);
+        assert_eq!(names, ["solid", "lao", "cao", "cao-literal", "rays"]);
         for way in Way::all() {
             assert_eq!(Way::parse(way.name()), Ok(way));
         }
-        assert!(Way::parse("none").is_err_and(|said| said.contains("cao-literal, sweep")));
+        assert!(Way::parse("none").is_err_and(|said| said.contains("cao-literal, rays")));
     }
 
     #[test]

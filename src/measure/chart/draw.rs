@@ -134,6 +134,9 @@ fn shape(quadrature: Option<Quadrature>) -> Marker {
         Some(Quadrature::Left) => Marker::Circle,
         Some(Quadrature::Cell) => Marker::Square,
         Some(Quadrature::Segment) => Marker::Triangle,
+        Some(Quadrature::Nearest) => Marker::Down,
+        Some(Quadrature::Hybrid) => Marker::Right,
+        Some(Quadrature::Linear) => Marker::Left,
         None => Marker::Diamond,
     }
 }

@@ -19,7 +19,7 @@ use super::reference::{self, Reference};
 use super::split::Split;
 use super::ssim::{Constants, ssim_3d};
 use crate::{Error, Result};
-use cao::method::Categories;
+use cao::ambient::Categories;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{DeviceKind, Gpu, Timings};
 use cao_model::clip::{Clip, Pose, Shape};

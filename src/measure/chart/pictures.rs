@@ -5,6 +5,7 @@ use super::{Entrant, Known, Setting, Values};
 use crate::error::{Errors, errors};
 use cao::renderer::StereoImage;
 use cao_formats::Picture;
+use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use cao_twin::{Grid, trilinear_clamped};
 
@@ -30,10 +31,12 @@ pub const SATURATED: f32 = 0.2;
 const BACKGROUND: [f32; 3] = [0.008_568_126, 0.009_721_218, 0.012_286_488];
 const NOTHING: [u8; 3] = [0xd8, 0xd8, 0xd8];
 
-/// One setting of each method: 26 weighted rays with the segment rule where there are such, else the paper's 26, else any.
+/// One setting of each method: the default's own, 26 weighted rays with the segment rule where there are such, else the paper's 26, else any.
 pub(super) fn featured<'a>(
     entries: impl Iterator<Item = &'a Entrant> + Clone,
 ) -> Vec<(&'static str, Setting)> {
+    let default = Method::default();
+    let ours = format!("{} {}", default.rays().name(), default.quadrature().name());
     let mut chosen: Vec<(&'static str, Setting)> = Vec::new();
     for entry in entries.clone() {
         if chosen.iter().any(|(method, _)| *method == entry.method) {
@@ -43,7 +46,8 @@ pub(super) fn featured<'a>(
             entries.clone().filter(|e| e.method == entry.method).map(|e| &e.setting).collect();
         let best = own
             .iter()
-            .find(|s| s.label == "26w" && s.quadrature == Some(Quadrature::Segment))
+            .find(|s| s.name() == ours)
+            .or_else(|| own.iter().find(|s| s.label == "26w" && s.quadrature == Some(Quadrature::Segment)))
             .or_else(|| own.iter().find(|s| s.label == "26"))
             .unwrap_or(&own[own.len() / 2]);
         chosen.push((entry.method, (*best).clone()));

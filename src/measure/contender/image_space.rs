@@ -1,4 +1,4 @@
-//! `image space`: ambient occlusion from each eye's depth image (`stage::ssao`), as renderers without data-space values have
+//! `image space`: ambient occlusion from each eye's depth image ([`Ssao`]), as renderers without data-space values have
 //! it. Its time is that of both eyes' passes; the depth images it takes are those of the frame, which is drawn anyway.
 //!
 //! It has values at what the eyes see only: its errors are at points of the surface in the left eye's image. It shades half

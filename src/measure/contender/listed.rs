@@ -15,38 +15,28 @@ pub struct Listed {
     pub ray: f64,
     /// Its ray sets for a first look: the cheapest and the dearest, and those of the default size.
     pub few: &'static [RaySet],
-    /// Sets that are also tried with samples closer together than by default: at most so many voxels apart.
-    pub finer: &'static [(RaySet, f32)],
 }
 
 impl Listed {
     /// Every rule with every set; for a first look some of each.
     pub fn entrants(&self, name: &'static str, asked: &Asked) -> Vec<Entrant> {
         let entry = self.method.entry();
-        let (sets, finer) = if asked.quick { (self.few, &[][..]) } else { (entry.sets, self.finer) };
+        let sets = if asked.quick { self.few } else { entry.sets };
         let mut rules = entry.quadratures.to_vec();
         if asked.quick && rules.len() > 2 {
-            // The paper's and the most accurate.
+            // The method's own and the most accurate.
             rules.drain(1..rules.len() - 1);
         }
         let own = Setup::of(self.method, asked.min_spacing);
-        let even = rules.iter().flat_map(|&quadrature| {
+        let settings = rules.iter().flat_map(|&quadrature| {
             sets.iter().map(move |&rays| Occlusion { rays, quadrature, ..own.occlusion })
         });
-        let finer = finer.iter().map(|&(rays, voxels)| Occlusion {
-            rays,
-            step_mm: Some(voxels * asked.min_spacing as f32),
-            ..own.occlusion
-        });
-        even.chain(finer).map(|occlusion| self.entrant(name, Setup { occlusion, ..own }, asked)).collect()
+        settings.map(|occlusion| self.entrant(name, Setup { occlusion, ..own }, asked)).collect()
     }
 
     fn entrant(&self, name: &'static str, setup: Setup, asked: &Asked) -> Entrant {
         let occlusion = &setup.occlusion;
-        let mut setting = Setting::rays(self.method, occlusion, asked.min_spacing, self.computes);
-        if occlusion.step_mm.is_some() {
-            setting.label += ", finer";
-        }
-        rendered::entrant(name, setup, setting, self.ray * occlusion.rays.directions().len() as f64)
+        let setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
+        rendered::entrant(name, setup, setting, self.ray * occlusion.rays.count() as f64)
     }
 }

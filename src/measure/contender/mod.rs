@@ -16,7 +16,7 @@ use cao::renderer::StereoImage;
 use cao_gpu::{Gpu, Timings};
 use cao_model::clip::Clip;
 use cao_model::look::Look;
-use cao_model::methods::{Method, Samples};
+use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
@@ -36,7 +36,6 @@ static CONTENDERS: [Kind; 7] = [
             computes: "voxels that show recomputed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
-            finer: &[],
         }),
     },
     Kind { name: "CAO literal", enters: Enters::By(paper::literal) },
@@ -47,17 +46,15 @@ static CONTENDERS: [Kind; 7] = [
             computes: "voxels that show and changed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
-            finer: &[],
         }),
     },
     Kind {
-        name: "sweep",
+        name: "rays",
         enters: Enters::As(Listed {
-            method: Method::Sweep,
+            method: Method::Rays,
             computes: "bricks that show and changed",
-            ray: 0.01,
-            few: &[RaySet::R6, RaySet::W14, RaySet::W26, RaySet::W50],
-            finer: &[(RaySet::W26, 1.25), (RaySet::W50, 1.15)],
+            ray: 0.05,
+            few: &[RaySet::Spiral(14), RaySet::Spiral(50), RaySet::Spiral(96)],
         }),
     },
 ];
@@ -183,19 +180,10 @@ pub struct Setting {
 
 impl Setting {
     /// That of rays.
-    fn rays(method: Method, occlusion: &Occlusion, min_spacing: f64, computes: &str) -> Self {
-        let details = match method.entry().samples {
-            Samples::Steps => {
-                let (step, first) = (occlusion.step(min_spacing), occlusion.first(min_spacing));
-                format!("step {step} mm, first sample at {first} mm, {computes}")
-            }
-            Samples::Lattice => {
-                let step = occlusion.lattice_step(min_spacing);
-                let from = occlusion.lattice_offset(min_spacing);
-                format!("samples at most {step} mm apart, from {from} mm on, {computes}")
-            }
-        };
-        Self { label: occlusion.rays.name().into(), quadrature: Some(occlusion.quadrature), details }
+    fn rays(occlusion: &Occlusion, min_spacing: f64, computes: &str) -> Self {
+        let (step, first) = (occlusion.step(min_spacing), occlusion.first(min_spacing));
+        let details = format!("step {step} mm, first sample at {first} mm, {computes}");
+        Self { label: occlusion.rays.name(), quadrature: Some(occlusion.quadrature), details }
     }
 
     /// Label and rule, as `26w segment`.
@@ -269,8 +257,7 @@ mod tests {
         for entry in METHODS {
             let own: Vec<_> = listed.iter().filter(|listed| listed.method == entry.method).collect();
             assert_eq!(own.len(), 1, "{}", entry.name);
-            let tried = own[0].few.iter().chain(own[0].finer.iter().map(|(set, _)| set));
-            assert!(tried.clone().all(|set| entry.sets.contains(set)), "{}", entry.name);
+            assert!(own[0].few.iter().all(|set| entry.sets.contains(set)), "{}", entry.name);
         }
         assert_eq!(listed.len(), METHODS.len());
     }
@@ -279,17 +266,14 @@ mod tests {
     #[test]
     fn names_stay() {
         let names = CONTENDERS.each_ref().map(|kind| kind.name);
-        assert_eq!(
-            names,
-            ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "sweep"]
-        );
-        assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "sweep"]);
+        assert_eq!(names, ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"]);
+        assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "rays"]);
         assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6]);
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 4]), (false, [1, 3, 4, 21, 4, 21, 6])] {
+        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 6]), (false, [1, 3, 4, 21, 4, 21, 15])] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

@@ -38,10 +38,10 @@ fn entrants(
 ) -> Vec<Entrant> {
     let entrant = |&rays: &RaySet| {
         let occlusion = Occlusion { rays, ..setup.occlusion };
-        let setting = Setting::rays(setup.method, &occlusion, asked.min_spacing, computes);
+        let setting = Setting::rays(&occlusion, asked.min_spacing, computes);
         let setup = Setup { occlusion, scope: Scope::All, ..setup };
         // The literal maps, too, have all of it recomputed, or nearly.
-        rendered::entrant(name, setup, setting, rays.directions().len() as f64)
+        rendered::entrant(name, setup, setting, rays.count() as f64)
     };
     sets.iter().map(entrant).collect()
 }

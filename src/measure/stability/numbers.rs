@@ -81,7 +81,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     };
     let mut series = Vec::new();
     let mut even = Even::new(gpu)?;
-    for quadrature in Quadrature::ALL {
+    for quadrature in Quadrature::CAST {
         let mut points = Vec::new();
         for &opacity in &plan.opacities {
             let found = even.ambient(opacity as f32, quadrature)?;
@@ -217,8 +217,9 @@ fn closed_form(quadrature: Quadrature, q: f64, m: f64) -> f64 {
     match quadrature {
         Quadrature::Left => powers / m,
         Quadrature::Cell => powers / m * (1.0 + q) / 2.0,
-        Quadrature::Segment if q == 0.0 => 0.0,
-        Quadrature::Segment => {
+        // Rays by brick have the same integral.
+        _ if q == 0.0 => 0.0,
+        _ => {
             let depth = -(m - 0.5) * q.ln();
             -(-depth).exp_m1() / depth
         }
@@ -249,7 +250,7 @@ fn cases(gpu: &Gpu, tick: &mut dyn FnMut()) -> Result<Vec<(String, Outcome)>> {
     };
     let numbers = |volume: &Volume, radius: f32, right: &dyn Fn(f32) -> bool| {
         let mut renderer = renderer(gpu, volume, occlusion(Quadrature::Left, radius))?;
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             let values = computed(&mut renderer, occlusion(quadrature, radius))?;
             if let Some(bad) =
                 values.iter().find(|v| !(0.0..=1.0 + ROUNDING as f32).contains(*v) || !right(**v))
@@ -316,7 +317,7 @@ fn poisoned(radius: u32) -> f64 {
     let middle = edge / 2;
     let opacity = |at: [i32; 3]| if at == [middle; 3] { f64::NAN } else { 0.1 };
     let inside = |at: [i32; 3]| at.iter().all(|c| (0..edge).contains(c));
-    let directions = RaySet::R26.directions();
+    let directions = RaySet::R26.lattice();
     let spoiled = |voxel: [i32; 3]| {
         let sum: f64 = directions
             .iter()

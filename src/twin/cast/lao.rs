@@ -45,11 +45,8 @@ pub fn lao_at(
 
 /// Unit vectors in mm, as index coordinates per mm, and weights.
 pub(crate) fn rays(grid: &Grid, occlusion: &Occlusion) -> Vec<([f64; 3], f64)> {
-    let unit = |v: [i32; 3]| {
-        let length = f64::from(v.map(|c| c * c).iter().sum::<i32>()).sqrt();
-        std::array::from_fn(|i| f64::from(v[i]) / length / grid.spacing[i])
-    };
-    occlusion.rays.directions().into_iter().map(|(v, weight)| (unit(v), weight)).collect()
+    let per_mm = |v: [f64; 3]| std::array::from_fn(|i| v[i] / grid.spacing[i]);
+    occlusion.rays.directions().into_iter().map(|(v, weight)| (per_mm(v), weight)).collect()
 }
 
 /// Ambient value of one voxel along given [`rays`].
@@ -82,6 +79,7 @@ pub(crate) fn along(
                 Quadrature::Left => left(samples, ratio, at),
                 Quadrature::Cell => cell(samples, ratio, at),
                 Quadrature::Segment => segment(samples, ratio, at),
+                rule => panic!("{rule:?} is a rule of rays by brick"),
             };
     }
     ambient
@@ -163,7 +161,7 @@ mod tests {
         for dims in [[5, 5, 5], [1, 1, 1], [1, 7, 1], [3, 1, 2]] {
             let grid = Grid { dims, spacing: [1.0, 0.7, 2.0] };
             for rays in RaySet::ALL {
-                for quadrature in Quadrature::ALL {
+                for quadrature in Quadrature::CAST {
                     for value in lao(&grid, &vec![0.0; grid.len()], &settings(rays, quadrature, 4.0), 1.0) {
                         close(value, 1.0, "empty");
                     }
@@ -175,7 +173,7 @@ mod tests {
     #[test]
     fn radius_zero_is_unobstructed() {
         let grid = Grid { dims: [3, 3, 3], spacing: UNIT };
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             assert_eq!(lao(&grid, &[1.0; 27], &settings(RaySet::R26, quadrature, 0.0), 1.0), [1.0; 27]);
         }
     }
@@ -190,6 +188,7 @@ mod tests {
             Quadrature::Cell => (1.0 - q.powf(m)) / (m * (1.0 - q)) * (1.0 + q) / 2.0,
             Quadrature::Segment if q == 0.0 => 0.0,
             Quadrature::Segment => (1.0 - q.powf(m - 0.5)) / (-(m - 0.5) * q.ln()),
+            rule => panic!("{rule:?}"),
         }
     }
 
@@ -197,7 +196,7 @@ mod tests {
     fn uniform_opacity_has_the_closed_form() {
         let grid = Grid { dims: [15, 15, 15], spacing: UNIT };
         for rays in RaySet::ALL {
-            for quadrature in Quadrature::ALL {
+            for quadrature in Quadrature::CAST {
                 for a in [0.0, 1e-6_f32, 0.1, 0.5, 0.97, 1.0] {
                     let opacity = vec![a; grid.len()];
                     let found = lao_at(&grid, &opacity, &settings(rays, quadrature, 6.0), 1.0, [7, 7, 7]);
@@ -219,7 +218,7 @@ mod tests {
     fn uniform_opacity_is_corrected_when_the_step_is_not_the_reference_length() {
         let grid = Grid { dims: [21, 21, 21], spacing: UNIT };
         let opacity = vec![0.25; grid.len()];
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             for (step, reference) in [(2.0_f32, 1.0), (0.5, 1.0), (1.0, 3.0)] {
                 let occlusion = Occlusion { step_mm: Some(step), ..settings(RaySet::R14, quadrature, 6.0) };
                 let found = lao_at(&grid, &opacity, &occlusion, reference, [10, 10, 10]);
@@ -234,7 +233,7 @@ mod tests {
     fn scaling_every_length_changes_nothing() {
         let grid = Grid { dims: [6, 5, 7], spacing: [1.0, 1.5, 2.0] };
         let opacity = crate::random::Random(3).opacities(grid.len());
-        for quadrature in Quadrature::ALL {
+        for quadrature in Quadrature::CAST {
             let one = lao(&grid, &opacity, &settings(RaySet::W26, quadrature, 4.0), 1.0);
             let larger = Grid { spacing: grid.spacing.map(|s| s * 4.0), ..grid };
             let four = lao(&larger, &opacity, &settings(RaySet::W26, quadrature, 16.0), 4.0);
@@ -269,8 +268,7 @@ mod tests {
             let expected: f64 = rays
                 .directions()
                 .iter()
-                .map(|&([x, y, z], weight)| {
-                    let slope = f64::from(z) / f64::from(x * x + y * y + z * z).sqrt();
+                .map(|&([_, _, slope], weight)| {
                     let (mut sum, mut t) = (0.0, 1.0);
                     for m in 1..=7 {
                         sum += t;
@@ -280,7 +278,7 @@ mod tests {
                 })
                 .sum();
             let found = lao_at(&grid, &opacity, &settings(rays, Quadrature::Left, 7.0), 1.0, [9, 9, 9]);
-            close(found, expected, rays.name());
+            close(found, expected, &rays.name());
         }
     }
 
@@ -311,13 +309,13 @@ mod tests {
         let mut opacity = vec![0.0; grid.len()];
         opacity[grid.index([8, 8, 8])] = 1.0;
         for rays in RaySet::ALL {
-            let axis = rays.directions().iter().find(|d| d.0 == [1, 0, 0]).unwrap().1;
+            let axis = rays.directions().iter().find(|d| d.0 == [1.0, 0.0, 0.0]).unwrap().1;
             for d in 4..=6_usize {
                 for eye in
                     [[8 - d, 8, 8], [8 + d, 8, 8], [8, 8 - d, 8], [8, 8 + d, 8], [8, 8, 8 - d], [8, 8, 8 + d]]
                 {
                     let found = lao_at(&grid, &opacity, &settings(rays, Quadrature::Left, 6.0), 1.0, eye);
-                    close(found, 1.0 - axis * (1.0 - d as f64 / 6.0), rays.name());
+                    close(found, 1.0 - axis * (1.0 - d as f64 / 6.0), &rays.name());
                 }
             }
         }
@@ -360,7 +358,7 @@ mod tests {
             let grid = Grid { dims, spacing: [0.3, 1.0, 2.5] };
             let opacity = crate::random::Random(11).opacities(grid.len());
             for rays in RaySet::ALL {
-                for quadrature in Quadrature::ALL {
+                for quadrature in Quadrature::CAST {
                     for offset in [None, Some(0.0), Some(0.7)] {
                         let occlusion = Occlusion { offset_mm: offset, ..settings(rays, quadrature, 2.0) };
                         for value in lao(&grid, &opacity, &occlusion, 0.5) {

@@ -251,11 +251,9 @@ pub(crate) mod tests {
         let offset = occlusion.offset_mm.map_or(step / 2.0, f64::from);
         let mut found = Vec::new();
         for (v, _) in occlusion.rays.directions() {
-            let norm = f64::from(v.map(|c| c * c).iter().sum::<i32>()).sqrt();
             for m in 0..=samples {
                 let s = offset + (f64::from(m) - 0.5) * step;
-                let at: [f64; 3] =
-                    std::array::from_fn(|i| voxel[i] as f64 + s * f64::from(v[i]) / norm / grid.spacing[i]);
+                let at: [f64; 3] = std::array::from_fn(|i| voxel[i] as f64 + s * v[i] / grid.spacing[i]);
                 for corner in 0..8 {
                     let c: [i64; 3] =
                         std::array::from_fn(|i| at[i].floor() as i64 + i64::from(corner >> i & 1));

@@ -98,7 +98,7 @@ impl ClipField {
     /// Peels and dilates a mesh clip for rays that reach `reach_mm` in `grid`; an analytic clip needs no maps.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] when the dilation map has fewer than 4 cells along an edge.
+    /// [`cao_model::Error::Config`] when the dilation map has fewer than 4 cells along an edge.
     pub fn new(clip: &Clip, grid: &Grid, reach_mm: f32, maps: &Maps) -> Result<Self> {
         let radius_mm = match maps.dilation {
             Dilation::Conservative(_) => {

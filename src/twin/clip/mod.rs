@@ -1,5 +1,6 @@
 //! Clips: depth layers, dilation maps, classification.
 
+pub mod carve;
 pub mod classify;
 pub mod clip_bricks;
 pub mod clips;

@@ -1,5 +1,6 @@
 //! Values to opacities, and what is known of whole bricks.
 
 pub mod bricks;
+pub mod near;
 pub mod occupancy;
 pub mod opacity;

@@ -1,0 +1,81 @@
+// Which bricks an edit concerns: those with voxels that need a value and within reach of a changed brick (method.md section 5).
+//
+// `spread` is one pass of a separable Euclidean distance transform over bricks, along one axis; the distance between two
+// bricks is that of their nearest voxels. After three passes `choose` decides, and lists the bricks to compute.
+
+struct NearParams {
+    bricks: vec3<u32>,
+    axis: u32,
+    // mm
+    spacing: vec3<f32>,
+    // how far a change of opacity reaches, mm
+    reach: f32,
+    // 1: voxels that no sample with opacity interpolates get a value too
+    unneeded: u32,
+}
+
+struct Distance {
+    squared: array<f32>,
+}
+
+// Bits of a squared distance that is farther than any volume reaches: what no brick is near to. After `choose` hosts fill with it.
+const FAR = 0x7e000000u;
+
+#include "shared/growing.wgsl"
+#include "shared/todo.wgsl"
+
+var<immediate> params: NearParams;
+@group(0) @binding(0) var<storage, read> before: Distance;
+@group(0) @binding(1) var<storage, read_write> after: Distance;
+@group(0) @binding(2) var<storage, read> contact: Contact;
+@group(0) @binding(3) var<storage, read_write> todo: Todo;
+@group(0) @binding(4) var<storage, read_write> growing: GrowingList;
+
+// One invocation a brick.
+@compute @workgroup_size(LANES)
+fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = item_of(id, groups);
+    if index >= brick_count(params.bricks) {
+        return;
+    }
+    let here = i32(brick_at(index, params.bricks)[params.axis]);
+    let size = i32(params.bricks[params.axis]);
+    let stride = vec3(1u, params.bricks.x, params.bricks.x * params.bricks.y)[params.axis];
+    let edge = params.spacing[params.axis];
+    let first = index - u32(here) * stride;
+    // Bricks n apart have BRICK (n - 1) + 1 voxels' spacing between their nearest voxels.
+    let most = i32(min(params.reach / (f32(BRICK) * edge) + 2.0, f32(size)));
+    var least = before.squared[index];
+    for (var there = max(here - most, 0); there <= min(here + most, size - 1); there++) {
+        let gap = f32(max(i32(BRICK) * abs(there - here) - i32(BRICK - 1u), 0)) * edge;
+        least = min(least, before.squared[first + u32(there) * stride] + gap * gap);
+    }
+    after.squared[index] = least;
+}
+
+// One invocation a brick.
+@compute @workgroup_size(LANES)
+fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let index = item_of(id, groups);
+    if index >= brick_count(params.bricks) {
+        return;
+    }
+    let own = brick_at(index, params.bricks);
+    var needed = params.unneeded;
+    // The brick's own opacity, or a neighbour's that touches it.
+    for (var n = 0; n < 27; n++) {
+        let place = vec3<i32>(own) + vec3(n % 3, n / 3 % 3, n / 9) - 1;
+        if all(place >= vec3(0)) && all(place < vec3<i32>(params.bricks)) {
+            needed |= contact.bits[brick_index(vec3<u32>(place), params.bricks)] >> u32(26 - n) & 1u;
+        }
+    }
+    let chosen = needed == 1u && before.squared[index] <= params.reach * params.reach;
+    todo.brick[index] = select(0u, TODO, chosen);
+    if chosen {
+        let slot = atomicAdd(&growing.count, 1u);
+        growing.items[slot] = index;
+        let through = groups_through(slot);
+        atomicMax(&growing.groups_x, through.x);
+        atomicMax(&growing.groups_y, through.y);
+    }
+}

@@ -1,0 +1,311 @@
+// Rays by brick (method.md section 4). One workgroup a brick of the list: its voxels that need a value are gathered in workgroup memory,
+// then the group takes pairs (voxel, direction), voxels fastest, so that a subgroup shares its direction. What a ray contributes is whole
+// numbers, so sums are exact in any order, and a value depends on nothing but the opacities that its rays meet.
+//
+// A rule says how many cells of a ray, near its voxel, have the filter's opacity in their middle, the first cell in each of its
+// halves: none (`nearest`), NEAR (`hybrid`) or all (`linear`). The others have that of the voxel nearest to their middle, found in
+// whole UNITths of a voxel.
+
+struct RaysParams {
+    dims: vec3<u32>,
+    // 0 where rays have no cells: then every value is 1
+    directions: u32,
+    bricks: vec3<u32>,
+    // of a ray, one step long each; the last counts half
+    cells: u32,
+    // farthest cell from its voxel along each axis
+    reach: vec3<u32>,
+    // first entry of the list to work on
+    base: u32,
+    // 1: every voxel gets a value
+    unneeded: u32,
+    // step / reference length of the opacity
+    exponent: f32,
+    // how much farther out than half a step rays begin, in steps
+    shift: f32,
+}
+
+struct Direction {
+    // in UNITths of a voxel
+    step: vec3<i32>,
+    // what a lost half cell adds to a sum
+    factor: f32,
+    // in voxels
+    half_step: vec3<f32>,
+}
+
+struct Directions {
+    all: array<Direction>,
+}
+
+struct Cells {
+    // a / -ln(1 - a) in WHOLE + 1ths, at a = multiples of 256 / WHOLE
+    mean: array<u32, MEANS>,
+}
+
+// T in WHOLEths, and its integral in WHOLEths of half a step.
+struct Ray {
+    through: u32,
+    sum: u32,
+}
+
+#include "shared/bricks.wgsl"
+#include "shared/opaque.wgsl"
+#include "shared/parts.wgsl"
+
+var<immediate> params: RaysParams;
+@group(0) @binding(0) var opacity: texture_3d<f32>;
+// linear, transparent outside the volume
+@group(0) @binding(1) var field: sampler;
+@group(0) @binding(2) var<storage, read> directions: Directions;
+@group(0) @binding(3) var<storage, read> cells: Cells;
+@group(0) @binding(4) var<storage, read> list: BrickList;
+@group(0) @binding(5) var ambient: texture_storage_3d<r16unorm, write>;
+
+// PARTS as a whole number: T of a ray that met nothing.
+const WHOLE = 65535u;
+// Parts of a voxel that far cells are found in.
+const UNIT = 65536;
+const UNIT_BITS = 16u;
+// Parts of a WHOLEth that a voxel's sum is in.
+const FINE = 16384u;
+const FINE_BITS = 14u;
+// Entries of a table of cells' means, 256 opacities from one to the next.
+const MEANS = 257u;
+// A ray with less than 2^-10 is at its end: looked at after the near cells of `hybrid`, each cell of `linear`, each group of far ones.
+const DARK = 64u;
+// Cells of `hybrid` that have the filter's opacity.
+const NEAR = 3u;
+// Far cells that are looked up together: behind near cells, and without them.
+const FEW = 2u;
+const MANY = 4u;
+
+const NEAREST = 0u;
+const HYBRID = 1u;
+const LINEAR = 2u;
+
+// Invocations of a workgroup.
+const TEAM = 256u;
+// Voxels of a brick.
+const VOXELS = BRICK * BRICK * BRICK;
+// Edge of a brick with the voxels around it.
+const AROUND = BRICK + 2u;
+
+// Bits x + 1 of the rows of voxels -1 ... BRICK that have opacity, y + 1 + AROUND (z + 1).
+var<workgroup> rows: array<atomic<u32>, AROUND * AROUND>;
+var<workgroup> found: atomic<u32>;
+// Voxels that need a value, two a word.
+var<workgroup> members: array<atomic<u32>, VOXELS / 2u>;
+// What occlusion takes from them, in FINEths of a WHOLEth.
+var<workgroup> sums: array<atomic<u32>, VOXELS>;
+var<workgroup> cell_means: array<u32, MEANS>;
+
+fn needed(local: vec3<u32>) -> bool {
+    var bits = 0u;
+    for (var z = 0u; z < 3u; z++) {
+        for (var y = 0u; y < 3u; y++) {
+            bits |= atomicLoad(&rows[local.y + y + AROUND * (local.z + z)]);
+        }
+    }
+    return (bits >> local.x & 7u) != 0u;
+}
+
+// 1 - a; a filter of opaque matter is opaque, whatever it rounds.
+fn clear(a: vec4<f32>) -> vec4<f32> {
+    let q = 1.0 - a;
+    return select(q, vec4(0.0), q < vec4(OPAQUE));
+}
+
+// In WHOLEths, of one step. Four at once: one branch, which all take alike.
+fn in_steps(a: vec4<f32>) -> vec4<u32> {
+    var of_step = a;
+    if params.exponent != 1.0 {
+        of_step = select(1.0 - pow(clear(a), vec4(params.exponent)), vec4(0.0), a == vec4(0.0));
+    }
+    // 2^23 is where whole numbers are all that f32 has.
+    return bitcast<vec4<u32>>(of_step * PARTS + 8388608.0) & vec4(0xffffu);
+}
+
+fn in_step(a: f32) -> u32 {
+    return in_steps(vec4(a, 0.0, 0.0, 0.0)).x;
+}
+
+// One cell of opacity `a`; `halves` is what it counts.
+fn pass_cell(ray: Ray, a: u32, halves: u32) -> Ray {
+    // WHOLEths to WHOLE + 1ths, so that 0 leaves all and WHOLE nothing.
+    let after = (ray.through * (65536u - a - (a >> 15u)) + 32768u) >> 16u;
+    let mean = (ray.through * cell_means[(a + 128u) >> 8u] + 32768u) >> 16u;
+    return Ray(after, ray.sum + halves * mean);
+}
+
+// Opacity of the voxel at a place.
+fn met(at: vec3<i32>, interior: bool) -> f32 {
+    let voxel = at >> vec3(UNIT_BITS);
+    if interior || all(vec3<u32>(voxel) < params.dims) {
+        return textureLoad(opacity, voxel, 0).r;
+    }
+    return 0.0;
+}
+
+// Cells behind `near` ones, by nearest voxels, in groups of MANY if `many`, of FEW else: loads come before the steps that use them.
+fn far_cells(start: Ray, voxel: vec3<u32>, interior: bool, k: u32, near: u32, many: bool) -> Ray {
+    var ray = start;
+    if ray.through < DARK {
+        return ray;
+    }
+    let group = select(FEW, MANY, many);
+    let step = directions.all[k].step;
+    let first = vec3<i32>(round(params.shift * vec3<f32>(step)));
+    var at = vec3<i32>(voxel) * UNIT + UNIT / 2 + first + step * i32(near);
+    var m = near;
+    while m + group < params.cells {
+        var a = vec4(met(at + step, interior), met(at + 2 * step, interior), 0.0, 0.0);
+        if many {
+            a.z = met(at + 3 * step, interior);
+            a.w = met(at + 4 * step, interior);
+        }
+        at += step * i32(group);
+        m += group;
+        if a.x + a.y + a.z + a.w == 0.0 {
+            ray.sum += 2u * group * ray.through;
+        } else {
+            let of_step = in_steps(a);
+            ray = pass_cell(ray, of_step.x, 2u);
+            ray = pass_cell(ray, of_step.y, 2u);
+            if many {
+                ray = pass_cell(ray, of_step.z, 2u);
+                ray = pass_cell(ray, of_step.w, 2u);
+            }
+            if ray.through < DARK {
+                return ray;
+            }
+        }
+        if !interior && any(vec3<u32>(at >> vec3(UNIT_BITS)) >= params.dims) {
+            // Nothing beyond the border.
+            ray.sum += ray.through * (2u * (params.cells - m) - 1u);
+            return ray;
+        }
+    }
+    for (; m < params.cells; m++) {
+        at += step;
+        ray = pass_cell(ray, in_step(met(at, interior)), select(2u, 1u, m + 1u == params.cells));
+    }
+    return ray;
+}
+
+// The filter's opacity at so many half steps on a ray that begins half a step out.
+fn filtered(voxel: vec3<u32>, k: u32, half_steps: f32) -> f32 {
+    let at = vec3<f32>(voxel) + 0.5 + (half_steps + 2.0 * params.shift) * directions.all[k].half_step;
+    return textureSampleLevel(opacity, field, at * (1.0 / vec3<f32>(params.dims)), 0.0).r;
+}
+
+fn traced(voxel: vec3<u32>, interior: bool, k: u32, rule: u32) -> Ray {
+    var ray = Ray(WHOLE, 0u);
+    if rule == NEAREST {
+        return far_cells(ray, voxel, interior, k, 0u, true);
+    }
+    var a = vec4(filtered(voxel, k, 1.5), filtered(voxel, k, 2.5), 0.0, 0.0);
+    if rule == HYBRID {
+        a.z = filtered(voxel, k, 4.0);
+        a.w = filtered(voxel, k, 6.0);
+    }
+    let halves = 1.0 - sqrt(clear(a));
+    let near = in_steps(vec4(halves.xy, a.zw));
+    ray = pass_cell(ray, near.x, 1u);
+    if rule == HYBRID {
+        ray = pass_cell(ray, near.y, 1u);
+        ray = pass_cell(pass_cell(ray, near.z, 2u), near.w, 2u);
+        return far_cells(ray, voxel, interior, k, NEAR, false);
+    }
+    if params.cells > 1u {
+        ray = pass_cell(ray, near.y, 1u);
+    }
+    for (var m = 2u; m <= params.cells && ray.through >= DARK; m++) {
+        let of_step = in_step(filtered(voxel, k, f32(2u * m)));
+        ray = pass_cell(ray, of_step, select(2u, 1u, m == params.cells));
+    }
+    return ray;
+}
+
+// A voxel of a brick, x fastest.
+fn inside(i: u32) -> vec3<u32> {
+    return vec3(i, i / BRICK, i / (BRICK * BRICK)) % BRICK;
+}
+
+// Of a voxel that needs a value, in its brick.
+fn place_of(slot: u32) -> vec3<u32> {
+    return inside(atomicLoad(&members[slot >> 1u]) >> ((slot & 1u) * 16u) & 0xffffu);
+}
+
+// One brick.
+fn work(group: vec3<u32>, lane: u32, rule: u32) {
+    let entry = params.base + item_of_group(group);
+    let listed = entry < list.count;
+    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
+    for (var i = lane; i < AROUND * AROUND; i += TEAM) {
+        atomicStore(&rows[i], 0u);
+    }
+    for (var i = lane; i < MEANS; i += TEAM) {
+        cell_means[i] = cells.mean[i];
+    }
+    for (var i = lane; i < VOXELS / 2u; i += TEAM) {
+        atomicStore(&members[i], 0u);
+    }
+    if lane == 0u {
+        atomicStore(&found, 0u);
+    }
+    workgroupBarrier();
+    for (var i = lane; i < AROUND * AROUND * AROUND; i += TEAM) {
+        let place = vec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
+        // Beyond the low border it is a large number.
+        let voxel = corner + place - 1u;
+        if all(voxel < params.dims) && textureLoad(opacity, voxel, 0).r > 0.0 {
+            atomicOr(&rows[i / AROUND], 1u << place.x);
+        }
+    }
+    workgroupBarrier();
+    for (var i = lane; i < VOXELS; i += TEAM) {
+        let local = inside(i);
+        if listed && all(corner + local < params.dims) {
+            if params.unneeded == 1u || needed(local) {
+                let slot = atomicAdd(&found, 1u);
+                atomicOr(&members[slot >> 1u], i << ((slot & 1u) * 16u));
+                atomicStore(&sums[slot], 0u);
+            } else {
+                textureStore(ambient, corner + local, vec4(1.0, 0.0, 0.0, 0.0));
+            }
+        }
+    }
+    workgroupBarrier();
+    let count = atomicLoad(&found);
+    let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);
+    let whole = WHOLE * (2u * params.cells - 1u);
+    for (var i = lane; i < count * params.directions; i += TEAM) {
+        let slot = i % count;
+        let k = i / count;
+        let lost = whole - traced(corner + place_of(slot), interior, k, rule).sum;
+        if lost > 0u {
+            atomicAdd(&sums[slot], u32(f32(lost) * directions.all[k].factor));
+        }
+    }
+    workgroupBarrier();
+    for (var i = lane; i < count; i += TEAM) {
+        let value = WHOLE - ((atomicLoad(&sums[i]) + FINE / 2u) >> FINE_BITS);
+        textureStore(ambient, corner + place_of(i), vec4(f32(value) / PARTS, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TEAM)
+fn nearest(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work(group, lane, NEAREST);
+}
+
+@compute @workgroup_size(TEAM)
+fn hybrid(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work(group, lane, HYBRID);
+}
+
+@compute @workgroup_size(TEAM)
+fn linear(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work(group, lane, LINEAR);
+}

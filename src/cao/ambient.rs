@@ -1,0 +1,110 @@
+//! What a method of ambient occlusion is to the renderer.
+
+use crate::Result;
+use crate::drive::Part;
+use crate::field::bricks::BrickList;
+use crate::subject::Subject;
+use cao_gpu::{Buffer, Image, Timings};
+use cao_kernels::shared::categories::{AFFECTED, CLIPPED, UNTOUCHED};
+
+/// Keeps V_AO equal to what the subject's settings define. Owns its volumes and pipelines.
+pub trait Ambient: Send + Sync {
+    /// Takes the subject's settings, which are new; every value will have to be computed. Never uses the device's queue.
+    ///
+    /// # Errors
+    /// Settings that this method does not have; then nothing has changed.
+    fn set(&mut self, on: &Subject) -> Result<()> {
+        let _ = on;
+        Ok(())
+    }
+
+    /// What there is to do after these changes, in order. Where opacities changed, the subject's occupancy comes before it.
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>>;
+
+    /// Its volumes.
+    fn fields(&self) -> Fields<'_>;
+
+    /// Computes every value into `into`, which is all 1 before, from V_o as it is; leaves the rest as it was. Uses the device's queue and
+    /// waits for it.
+    fn recompute(
+        &self,
+        on: &Subject,
+        into: &Image,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Recomputation<'_>, Timings)>;
+
+    /// V_m, x fastest: [`CLIPPED`], [`AFFECTED`] or [`UNTOUCHED`] by the last update. Uses the device's queue and waits for it.
+    fn mask(&self, on: &Subject) -> Result<Vec<u8>>;
+
+    /// Voxels of each category after the last update. Uses the device's queue and waits for it.
+    fn categories(&self, on: &Subject) -> Result<Categories> {
+        let mask = self.mask(on)?;
+        Ok(Categories::each(|category| {
+            mask.iter().filter(|voxel| u32::from(**voxel) == category).count() as u32
+        }))
+    }
+}
+
+/// What changed since the last update.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Changed {
+    /// Values or transfer function: every opacity has to be looked at.
+    pub opacities: bool,
+    /// Rays, radius or reference length: every ambient value has to be computed anew.
+    pub anew: bool,
+    /// Shapes, sides or poses.
+    pub clips: bool,
+}
+
+impl Changed {
+    /// Nothing is up to date.
+    pub const ALL: Self = Self { opacities: true, anew: true, clips: true };
+    /// Everything is up to date.
+    pub const NOTHING: Self = Self { opacities: false, anew: false, clips: false };
+}
+
+/// What a picture is drawn from.
+#[derive(Clone, Copy)]
+pub struct Fields<'a> {
+    /// V_o after clipping.
+    pub opacity: &'a Image,
+    /// V_AO.
+    pub ambient: &'a Image,
+    /// What the clips do to each brick, u32 each.
+    pub clip_bricks: &'a Buffer,
+}
+
+/// What a recomputation covered.
+pub struct Recomputation<'a> {
+    /// The bricks that need values.
+    pub list: BrickList,
+    /// What the last update had computed.
+    pub recomputed: Recomputed<'a>,
+}
+
+/// Voxels of each category (CAO §3.3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Categories {
+    /// a: clipped.
+    pub clipped: u32,
+    /// b: visible, neighbourhood changed.
+    pub affected: u32,
+    /// c: untouched.
+    pub untouched: u32,
+}
+
+impl Categories {
+    /// What `of` says of each category, as the mask has it.
+    pub(crate) fn each(of: impl Fn(u32) -> u32) -> Self {
+        Self { clipped: of(CLIPPED), affected: of(AFFECTED), untouched: of(UNTOUCHED) }
+    }
+}
+
+/// How it is known which voxels were recomputed.
+#[derive(Clone, Copy)]
+pub enum Recomputed<'a> {
+    /// V_m; clipped voxels that touch no visible one have no value.
+    Mask(&'a Image),
+    /// A u32 a brick, [`TODO`](cao_kernels::compare::TODO) where they were.
+    Bricks(&'a Buffer),
+}

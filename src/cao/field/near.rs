@@ -1,0 +1,92 @@
+//! Which bricks an edit concerns (method.md §5.2): `todo(b) ⇔ needed(b) ∧ min_{b' changed} d(b, b') ≤ reach`, with d the
+//! distance in mm of the nearest voxels of two bricks, by a separable Euclidean distance transform.
+//!
+//! In and out: `change` (f32 a brick: squared distance, 0 where changed, [`FAR`] elsewhere; holds [`FAR`] again afterwards).
+//! In: `contact` of [`crate::clip::carve`]. Out: `todo` (a u32 a brick), and their `list`. Cost: a few reads a brick and axis.
+
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use crate::host::rows_over;
+use cao_gpu::Result;
+use cao_gpu::{Access, Buffer, Gpu, Pipeline, Recorder};
+use cao_kernels::near as kernel;
+use cao_model::settings::Scope;
+
+pub use cao_kernels::shared::todo::TODO;
+pub use kernel::FAR;
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// Squared distance in mm² to the nearest changed brick.
+    pub change: &'a Buffer,
+    /// As large; for the passes.
+    pub other: &'a Buffer,
+    /// Where each brick's opacity lies.
+    pub contact: &'a Buffer,
+    /// [`TODO`] or 0 for each brick, u32 each.
+    pub todo: &'a Buffer,
+    /// The bricks to do.
+    pub list: &'a BrickList,
+}
+
+/// The kernel `near`.
+pub struct Near {
+    spread: Pipeline,
+    choose: Pipeline,
+}
+
+impl Near {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let shader = &kernel::SHADER;
+        Ok(Self { spread: gpu.compute(shader, "spread")?, choose: gpu.compute(shader, "choose")? })
+    }
+
+    /// Chooses the bricks and makes the choice visible to indirect dispatches and compute shaders.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        scope: Scope,
+        reach_mm: f32,
+        b: Bindings,
+    ) -> Result<()> {
+        const { assert!(kernel::SPREAD_WORKGROUP[0] == kernel::CHOOSE_WORKGROUP[0]) };
+        let groups = rows_over(field.brick_count(), kernel::CHOOSE_WORKGROUP);
+        let mut params = kernel::NearParams {
+            bricks: field.bricks(),
+            axis: 0,
+            spacing: field.spacing,
+            reach: reach_mm,
+            unneeded: u32::from(scope == Scope::All),
+            pad: Default::default(),
+        };
+        let between = [Access::StorageRead, Access::StorageWrite];
+        let (mut before, mut after) = (b.change, b.other);
+        b.list.record_clear(rec)?;
+        for axis in 0..3 {
+            params.axis = axis;
+            let binds = kernel::SpreadBindings { before, after };
+            rec.dispatch(&self.spread, &binds, bytemuck::bytes_of(&params), groups)?;
+            rec.barrier(&between, &between);
+            (before, after) = (after, before);
+        }
+        let binds =
+            kernel::ChooseBindings { before, contact: b.contact, todo: b.todo, growing: &b.list.buffer };
+        rec.dispatch(&self.choose, &binds, bytemuck::bytes_of(&params), groups)?;
+        rec.barrier(
+            &between,
+            &[
+                Access::IndirectRead,
+                Access::StorageRead,
+                Access::StorageWrite,
+                Access::TransferRead,
+                Access::TransferWrite,
+            ],
+        );
+        rec.fill(b.change, 0, b.change.bytes(), FAR)?;
+        rec.barrier(&[Access::TransferWrite], &between);
+        Ok(())
+    }
+}

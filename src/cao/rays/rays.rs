@@ -1,0 +1,258 @@
+//! Rays by brick (method.md §4; `cao_twin::rays::rays` has the equations): every voxel of the listed bricks that needs a value, along every
+//! direction of a plan.
+//!
+//! In: `opacity` V_o (3D r16unorm, the only form of it), the list of bricks. Out: `ambient` V_AO (3D r16unorm) in the listed bricks, one
+//! write a voxel. Cost: N·M reads of V_o a voxel at most; a ray ends when it is dark or leaves the volume. Forms that were timed on a
+//! GPU: `benches/runs/2026-11-26-h200-rays-prototype/`.
+
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use crate::host::{device_buffer, row_of_groups};
+use cao_gpu::Result;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use cao_kernels::rays as kernel;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::settings::Scope;
+
+/// Longest ray, offset included, in smallest spacings: what was tested.
+pub const MOST_VOXELS: f32 = 256.0;
+
+/// What rays there are from every voxel: M cells of one step each, the m-th with its middle at m steps where rays begin half a step from
+/// their voxel, as they do unless an offset is given; they end in the middle of the last.
+#[derive(Clone, Debug)]
+pub struct RayPlan {
+    /// As the kernel reads them, in any order.
+    pub directions: Vec<kernel::Direction>,
+    /// How far in mm a change of opacity can change values: rays and what they interpolate.
+    pub reach_mm: f32,
+    rule: Quadrature,
+    /// M.
+    cells: u32,
+    step_mm: f32,
+    shift: f32,
+    /// Farthest cell from its voxel along each axis.
+    reach: [u32; 3],
+}
+
+impl RayPlan {
+    /// The rays of these settings, which hold, at voxels of this spacing in mm.
+    ///
+    /// # Errors
+    /// [`cao_model::Error::Limit`] for rays longer than [`MOST_VOXELS`].
+    pub fn new(spacing: [f32; 3], occlusion: &Occlusion) -> cao_model::Result<Self> {
+        let smallest = spacing.into_iter().fold(f32::INFINITY, f32::min);
+        let (cells, far) = (occlusion.samples(smallest.into()), occlusion.reach(smallest.into()) / smallest);
+        // Rounding of lengths in mm must not refuse it.
+        if far > MOST_VOXELS * 1.001 {
+            return Err(cao_model::Error::Limit {
+                what: format!("voxels along a ray of {} mm at {smallest} mm a voxel", occlusion.radius_mm),
+                needed: far.ceil() as u64,
+                limit: MOST_VOXELS as u64,
+                hint: "make the radius or the offset smaller, or use method cao or lao".into(),
+            });
+        }
+        let step_mm = occlusion.step(smallest.into());
+        // A step in voxels along each axis.
+        let step = |d: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|i| d[i] * f64::from(step_mm) / f64::from(spacing[i]))
+        };
+        let unit = f64::from(kernel::UNIT);
+        let halves = f64::from((2 * cells).saturating_sub(1).max(1));
+        let directions: Vec<_> = occlusion
+            .rays
+            .directions()
+            .into_iter()
+            .map(|(d, weight)| kernel::Direction {
+                step: step(d).map(|c| (unit * c).round() as i32),
+                factor: (weight * f64::from(kernel::FINE) / halves) as f32,
+                half_step: step(d).map(|c| (0.5 * c) as f32),
+                pad: Default::default(),
+            })
+            .collect();
+        let shift = occlusion.offset_mm.map_or(0.0, |offset| offset / step_mm - 0.5);
+        let farthest = |i: usize| {
+            let cell = |d: &kernel::Direction| {
+                let first = (shift * d.step[i] as f32).round_ties_even() as i32;
+                ((first + d.step[i] * cells as i32 + kernel::UNIT / 2) >> kernel::UNIT_BITS).unsigned_abs()
+            };
+            directions.iter().map(cell).max().unwrap_or(0)
+        };
+        let diagonal = glam::Vec3::from_array(spacing).length();
+        Ok(Self {
+            reach: std::array::from_fn(farthest),
+            // A hundredth for rounding, of which the 1/256 voxel of a GPU's texture coordinates is the most.
+            reach_mm: occlusion.reach(smallest.into()) + 1.01 * diagonal,
+            rule: match occlusion.quadrature {
+                // All cells are near.
+                Quadrature::Hybrid if cells <= kernel::NEAR => Quadrature::Linear,
+                rule => rule,
+            },
+            directions,
+            cells,
+            step_mm,
+            shift,
+        })
+    }
+
+    /// Reads of V_o for a brick, at most.
+    pub fn brick_samples(&self) -> f64 {
+        f64::from(kernel::VOXELS) * self.directions.len() as f64 * f64::from(self.cells.max(1))
+    }
+}
+
+/// `a / −ln(1 − a)` in 65536ths at a = 256 i / 65535, the mean transmittance of a cell of this opacity. The last is 0: nothing comes
+/// through.
+fn cell_means() -> kernel::Cells {
+    const LAST: usize = kernel::MEANS as usize - 1;
+    let whole = f64::from(kernel::WHOLE) + 1.0;
+    kernel::Cells {
+        mean: std::array::from_fn(|i| match i {
+            0 => whole as u32,
+            LAST => 0,
+            _ => {
+                let a = (256 * i) as f64 / f64::from(kernel::WHOLE);
+                (whole * a / -(1.0 - a).ln()).round() as u32
+            }
+        }),
+    }
+}
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// V_o.
+    pub opacity: &'a Image,
+    /// Bricks to work on.
+    pub list: &'a BrickList,
+    /// V_AO.
+    pub ambient: &'a Image,
+}
+
+/// The kernel `rays`, one pipeline a rule.
+pub struct Rays {
+    nearest: Pipeline,
+    hybrid: Pipeline,
+    linear: Pipeline,
+    field: Sampler,
+    directions: Buffer,
+    cells: Buffer,
+}
+
+impl Rays {
+    /// Builds the pipelines. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
+        let room = size_of::<kernel::Direction>() as u64 * u64::from(RaySet::MOST);
+        Ok(Self {
+            nearest: pipeline("nearest")?,
+            hybrid: pipeline("hybrid")?,
+            linear: pipeline("linear")?,
+            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
+            directions: gpu.buffer("directions", room, BufferUse::Device)?,
+            cells: device_buffer(gpu, "cell means", bytemuck::bytes_of(&cell_means()))?,
+        })
+    }
+
+    /// Writes the directions of a plan; once after each change of the settings.
+    pub fn record_directions(&self, rec: &mut Recorder, plan: &RayPlan) -> Result<()> {
+        rec.barrier(&[Access::StorageRead], &[Access::TransferWrite]);
+        rec.update(&self.directions, 0, bytemuck::cast_slice(&plan.directions))?;
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead]);
+        Ok(())
+    }
+
+    /// Works on the whole list by one indirect dispatch, along the directions written last. `opacity` is per `reference_mm`.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        plan: &RayPlan,
+        reference_mm: f32,
+        scope: Scope,
+        b: Bindings,
+    ) -> Result<()> {
+        let params = params(field, plan, reference_mm, scope, 0);
+        rec.dispatch_indirect(
+            self.pipeline(plan),
+            &self.binds(b),
+            bytemuck::bytes_of(&params),
+            &b.list.buffer,
+            0,
+        )
+    }
+
+    /// Works on `count` bricks of the list from `base`, for callers that split a long computation.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
+    pub fn record_part(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        plan: &RayPlan,
+        reference_mm: f32,
+        scope: Scope,
+        b: Bindings,
+        base: u32,
+        count: u32,
+    ) -> Result<()> {
+        let params = params(field, plan, reference_mm, scope, base);
+        rec.dispatch(self.pipeline(plan), &self.binds(b), bytemuck::bytes_of(&params), row_of_groups(count))
+    }
+
+    fn pipeline(&self, plan: &RayPlan) -> &Pipeline {
+        match plan.rule {
+            Quadrature::Nearest => &self.nearest,
+            Quadrature::Linear => &self.linear,
+            _ => &self.hybrid,
+        }
+    }
+
+    fn binds<'a>(&'a self, b: Bindings<'a>) -> kernel::HybridBindings<'a> {
+        kernel::HybridBindings {
+            opacity: b.opacity,
+            field: &self.field,
+            directions: &self.directions,
+            cells: &self.cells,
+            list: &b.list.buffer,
+            ambient: b.ambient,
+        }
+    }
+}
+
+fn params(field: &Field, plan: &RayPlan, reference_mm: f32, scope: Scope, base: u32) -> kernel::RaysParams {
+    kernel::RaysParams {
+        dims: field.dims,
+        directions: if plan.cells == 0 { 0 } else { plan.directions.len() as u32 },
+        bricks: field.bricks(),
+        cells: plan.cells,
+        reach: plan.reach,
+        base,
+        unneeded: u32::from(scope == Scope::All),
+        exponent: plan.step_mm / reference_mm,
+        shift: plan.shift,
+        pad: Default::default(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cell_means_fall_from_all_to_nothing() {
+        let means = cell_means().mean;
+        assert_eq!((means[0], means[256]), (65536, 0));
+        assert!(means.windows(2).all(|w| w[0] > w[1]));
+        // a = 0.5: 0.5 / ln 2.
+        assert!((f64::from(means[128]) / 65536.0 - 0.7213).abs() < 1e-3);
+    }
+
+    #[test]
+    fn rays_are_as_long_as_they_are_asked_for_and_no_longer_than_256_voxels() {
+        let of = |radius_mm| Occlusion { rays: RaySet::R6, radius_mm, ..Occlusion::paper(0.5) };
+        let plan = RayPlan::new([0.5, 1.0, 2.0], &of(128.0)).unwrap();
+        assert_eq!((plan.cells, plan.reach), (256, [256, 128, 64]));
+        let error = RayPlan::new([0.5, 1.0, 2.0], &of(129.0)).unwrap_err().to_string();
+        assert!(error.contains("258") && error.contains("256"), "{error}");
+        assert_eq!(RayPlan::new([1.0; 3], &of(0.0)).unwrap().cells, 0);
+    }
+}

@@ -1,0 +1,57 @@
+//! Which bricks an edit concerns (method.md §5.2): those with a voxel that needs a value, and with a voxel within `reach` mm of a
+//! voxel of a changed brick.
+
+use crate::Grid;
+use crate::field::bricks::{EDGE, bricks};
+
+/// Whether each brick of [`bricks`] is to be computed. A voxel needs a value if it or a neighbour has opacity; all do if
+/// `unneeded`.
+pub fn near(grid: &Grid, opacity: &[u16], changed: &[bool], reach_mm: f64, unneeded: bool) -> Vec<bool> {
+    let all = bricks(grid);
+    let mut needed = vec![unneeded; all.len()];
+    for i in 0..grid.len() {
+        let voxel = grid.voxel(i);
+        if opacity[i] > 0 || grid.neighbours(voxel).any(|n| opacity[grid.index(n)] > 0) {
+            needed[all.index(voxel.map(|c| c / EDGE))] = true;
+        }
+    }
+    let apart = |a: [usize; 3], b: [usize; 3]| -> f64 {
+        (0..3)
+            .map(|axis| {
+                // Between whole bricks: cut short at the upper end, a brick is no farther away.
+                let between = EDGE * a[axis].abs_diff(b[axis]);
+                (between.saturating_sub(EDGE - 1) as f64 * grid.spacing[axis]).powi(2)
+            })
+            .sum::<f64>()
+            .sqrt()
+    };
+    (0..all.len())
+        .map(|i| {
+            let close = |j: usize| changed[j] && apart(all.voxel(i), all.voxel(j)) <= reach_mm;
+            needed[i] && (0..all.len()).any(close)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bricks_within_reach_that_need_values_are_chosen() {
+        let grid = Grid { dims: [40, 8, 8], spacing: [0.5, 1.0, 1.0] };
+        let mut opacity = vec![0; grid.len()];
+        // In the second brick, beside the third; and in the fifth.
+        opacity[grid.index([15, 4, 4])] = 9;
+        opacity[grid.index([35, 4, 4])] = 9;
+        let changed = [true, false, false, false, false];
+        // Nearest voxels of neighbours are half a millimetre apart, of the next bricks 4.5, then 8.5 and 12.5.
+        let found = |reach, unneeded| near(&grid, &opacity, &changed, reach, unneeded);
+        assert_eq!(found(0.4, false), [false; 5]);
+        assert_eq!(found(0.5, false), [false, true, false, false, false]);
+        assert_eq!(found(12.4, false), [false, true, true, false, false]);
+        assert_eq!(found(12.5, false), [false, true, true, false, true]);
+        assert_eq!(found(4.5, true), [true, true, true, false, false]);
+        assert_eq!(near(&grid, &opacity, &[false; 5], 99.0, true), [false; 5]);
+    }
+}
