@@ -76,27 +76,40 @@ impl<'a> Part<'a> {
         match self.extent {
             Extent::Short => Some(0.0),
             Extent::Long => pace.ms(self.stage),
-            Extent::Items { items, .. } => Some(pace.ms(self.stage)? * f64::from(items.most)),
+            Extent::Items { items, .. } => {
+                pace.ms(self.stage).map(|ms| ms * f64::from(pace.most(self.stage, items)))
+            }
         }
     }
 }
 
-/// How long an item of a stage took, ms, as far as that was seen.
+/// How long an item of a stage took, ms, and how many there were at most, as far as that was seen since the settings changed. More may
+/// come, under a clip that lets more be seen: then one submission is longer than foreseen, and the next is careful again.
 #[derive(Default)]
-pub struct Pace(Vec<(Stage, f64)>);
+pub struct Pace(Vec<(Stage, f64, u32)>);
 
 impl Pace {
-    fn ms(&self, stage: Stage) -> Option<f64> {
-        self.0.iter().find(|(of, _)| *of == stage).map(|(_, ms)| *ms)
+    fn seen(&self, stage: Stage) -> Option<&(Stage, f64, u32)> {
+        self.0.iter().find(|(of, ..)| *of == stage)
     }
 
-    fn learn(&mut self, stage: Stage, ms: f64) {
+    fn ms(&self, stage: Stage) -> Option<f64> {
+        self.seen(stage).map(|(_, ms, _)| *ms)
+    }
+
+    /// How many items to foresee: those that were seen.
+    fn most(&self, stage: Stage, items: Items) -> u32 {
+        self.seen(stage).map_or(items.most, |(.., most)| (*most).min(items.most))
+    }
+
+    fn learn(&mut self, stage: Stage, ms: f64, items: u32) {
+        let most = self.seen(stage).map_or(0, |(.., most)| *most).max(items);
         self.forget(stage);
-        self.0.push((stage, ms));
+        self.0.push((stage, ms, most));
     }
 
     fn forget(&mut self, stage: Stage) {
-        self.0.retain(|(of, _)| *of != stage);
+        self.0.retain(|(of, ..)| *of != stage);
     }
 
     /// Nothing is known: other settings take another time.
@@ -141,7 +154,7 @@ pub fn run(gpu: &Gpu, parts: &[Part], pace: &mut Pace, progress: &mut dyn FnMut(
         match part.extent {
             Extent::Short | Extent::Long => {
                 together(gpu, std::slice::from_ref(part), pace, &mut timings)?;
-                pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3);
+                pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3, 1);
             }
             Extent::Items { items, first } => {
                 let count = read_count(gpu, items)?;
@@ -151,7 +164,7 @@ pub fn run(gpu: &Gpu, parts: &[Part], pace: &mut Pace, progress: &mut dyn FnMut(
                 add(&mut timings, part.stage, ms);
                 // What there are few of says little of many.
                 if count > 0 {
-                    pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3 / f64::from(count));
+                    pace.learn(part.stage, start.elapsed().as_secs_f64() * 1e3 / f64::from(count), count);
                 }
             }
         }
@@ -233,8 +246,8 @@ mod tests {
         let mut pace = Pace::default();
         let part = Part::long(LAO, |_| Ok(()));
         assert_eq!((part.at_most(&pace), Part::short(BRICKS, |_| Ok(())).at_most(&pace)), (None, Some(0.0)));
-        pace.learn(LAO, 3.0);
-        pace.learn(LAO, 2.0);
+        pace.learn(LAO, 3.0, 1);
+        pace.learn(LAO, 2.0, 1);
         assert_eq!(part.at_most(&pace), Some(2.0));
         pace.forget(LAO);
         assert_eq!(part.at_most(&pace), None);

@@ -3,7 +3,7 @@
 use cao_gpu::Error;
 use cao_gpu::{BufferUse, Gpu, OpenOptions, Shader, shader};
 use cao_testing::wgsl::{bind, compile, device_buffer};
-use cao_testing::{close, open};
+use cao_testing::{close, open, validated};
 use std::process::Command;
 
 /// Runs one ignored test of this module in a process of its own, with these variables in its environment.
@@ -101,6 +101,10 @@ fn lie(truth: &'static Shader, uses: shader::Use) -> &'static Shader {
 /// The distribution's layer sees this kind of missing barrier, if its synchronization checks are on.
 #[test]
 fn synchronization_validation_catches_a_barrier_that_reflection_hides() {
+    if !validated() {
+        eprintln!("skipped: CAO_VALIDATION=0, and this is about the validation layer");
+        return;
+    }
     let gpu = open();
     let write = compile(
         "struct Numbers { x: array<u32> }
@@ -121,6 +125,10 @@ fn synchronization_validation_catches_a_barrier_that_reflection_hides() {
 
 #[test]
 fn core_validation_catches_a_descriptor_that_reflection_hides() {
+    if !validated() {
+        eprintln!("skipped: CAO_VALIDATION=0, and this is about the validation layer");
+        return;
+    }
     let gpu = open();
     let truth = compile(
         "@group(0) @binding(0) var<storage, read_write> b: array<u32>;

@@ -3,8 +3,7 @@
 use cao_compile::{Bounds, Options, file, files};
 use cao_gpu::shader::Stage;
 use cao_testing::wgsl::{bind, compile_with, device_buffer, leak, read_back};
-use cao_testing::{close, open};
-use std::path::Path;
+use cao_testing::{close, open, source};
 
 const BOTH: [Options; 2] =
     [Options { bounds: Bounds::Unchecked, debug: false }, Options { bounds: Bounds::Checked, debug: false }];
@@ -12,10 +11,12 @@ const BOTH: [Options; 2] =
 #[test]
 fn every_compute_entry_point_becomes_a_pipeline_with_and_without_bounds_checks() {
     let gpu = open();
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/spirv"));
-    for path in files(root).unwrap() {
+    let root = source("spirv");
+    let kernels = files(&root).unwrap();
+    assert!(kernels.len() > 10, "{}: {} kernels", root.display(), kernels.len());
+    for path in kernels {
         for options in BOTH {
-            let shader = leak(file(root, &path, options).unwrap_or_else(|e| panic!("{e}")).shader);
+            let shader = leak(file(&root, &path, options).unwrap_or_else(|e| panic!("{e}")).shader);
             for entry in shader.entry_points.iter().filter(|e| e.stage == Stage::Compute) {
                 gpu.compute(shader, entry.name).unwrap();
                 gpu.assert_clean()

@@ -1,5 +1,6 @@
 //! The real programs, in folders of their own.
 
+mod bundle;
 mod chart;
 mod cli;
 mod cli_refusals;

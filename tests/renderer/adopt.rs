@@ -50,7 +50,10 @@ impl Host {
         unsafe {
             let entry = ash::Entry::load().unwrap();
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-            let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
+            let layers: Vec<_> = cao_testing::validated()
+                .then_some(c"VK_LAYER_KHRONOS_validation".as_ptr())
+                .into_iter()
+                .collect();
             let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
             let mut messenger = vk::DebugUtilsMessengerCreateInfoEXT::default()
                 .message_severity(

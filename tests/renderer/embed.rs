@@ -195,3 +195,48 @@ fn what_is_out_of_date_is_neither_drawn_nor_read() {
     }
     cao_testing::close(gpu);
 }
+
+/// What a frame of the default method asks of Vulkan, whatever changed: one submission once its pace is known, and few commands.
+#[test]
+fn an_update_is_one_submission_of_few_commands() {
+    const COMMANDS: u64 = 40;
+    let gpu = cao_testing::open();
+    let volume = cao_formats::open("builtin:engine:24").unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut setup = Setup::new(volume.min_spacing());
+    // Far from a tenth of a second on any device.
+    setup.occlusion.radius_mm = 3.0;
+    let mut r = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
+    r.update(&mut |_| ()).unwrap();
+    type Change<'a> = &'a dyn Fn(&mut Renderer);
+    let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+    let prepared = [clip(mesh, 2.0)];
+    r.set_clips(&prepared).unwrap();
+    let changes: [(&str, Change); 5] = [
+        ("a mesh", &|r| r.set_clips(&prepared).unwrap()),
+        ("a sphere", &|r| r.set_clips(&[clip(Shape::Sphere, 5.0)]).unwrap()),
+        ("it moved", &|r| r.set_clips(&[clip(Shape::Sphere, 4.0)]).unwrap()),
+        ("another transfer function", &|r| r.set_transfer(transfer.clone()).unwrap()),
+        ("everything", &Renderer::invalidate),
+    ];
+    for (what, change) in changes {
+        change(&mut r);
+        let before = gpu.counts();
+        r.update(&mut |_| ()).unwrap();
+        let asked = gpu.counts() - before;
+        assert_eq!(asked.submissions, 1, "{what}: {asked:?}");
+        assert!(asked.commands <= COMMANDS && asked.calls < 6 * COMMANDS, "{what}: {asked:?}");
+
+        change(&mut r);
+        let mut rec = gpu.recorder("host frame").unwrap();
+        r.record_update(&mut rec).unwrap();
+        let recorded = rec.counts();
+        assert!((1..=COMMANDS).contains(&recorded.commands), "{what}: {recorded:?}");
+        rec.submit_and_wait().unwrap();
+    }
+    let before = gpu.counts();
+    r.update(&mut |_| ()).unwrap();
+    assert_eq!(gpu.counts(), before, "nothing changed");
+    drop(r);
+    cao_testing::close(gpu);
+}

@@ -19,6 +19,7 @@ use cao_model::volume::Volume;
 use cao_twin::Grid;
 use glam::Vec3;
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Every method, the default first: what holds for one holds for all.
@@ -26,9 +27,22 @@ pub fn methods() -> impl Iterator<Item = Method> {
     METHODS.iter().rev().map(|entry| entry.method)
 }
 
-/// A device under core and synchronization validation. Tests end with [`close`].
+/// Whether devices that tests open are under validation: unless `CAO_VALIDATION=0` says that there is no layer here.
+pub fn validated() -> bool {
+    std::env::var_os("CAO_VALIDATION").is_none_or(|value| value != "0")
+}
+
+/// A file or folder of the repository that a test reads when it runs. `CAO_SOURCE` says where the repository lies now, by
+/// default where it was built.
+pub fn source(path: &str) -> PathBuf {
+    let root = std::env::var_os("CAO_SOURCE");
+    let root = root.unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../..").into());
+    PathBuf::from(root).join(path)
+}
+
+/// A device under core and synchronization validation, see [`validated`]. Tests end with [`close`].
 pub fn open() -> Gpu {
-    Gpu::open(&OpenOptions { validation: true, ..OpenOptions::default() })
+    Gpu::open(&OpenOptions { validation: validated(), ..OpenOptions::default() })
         .expect("these tests need Vulkan and its validation layer")
 }
 

@@ -58,6 +58,9 @@ pub struct Cli {
     /// volumes
     #[arg(long, value_name = "DIR", requires = "bars")]
     pub data: Option<PathBuf>,
+    /// Measure 1024³ voxels too: some 6 GiB of device memory
+    #[arg(long, requires = "bars")]
+    pub large: bool,
     #[command(flatten)]
     pub settings: Settings,
     #[command(flatten)]

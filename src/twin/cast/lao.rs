@@ -416,7 +416,7 @@ mod tests {
                     let (mut depth, mut sum) = (0.0, 0.0);
                     for i in 0..n {
                         let s = offset + (f64::from(i) + 0.5) * h;
-                        let at = std::array::from_fn(|a| eye[a] as f64 + s * f64::from(v[a]));
+                        let at = std::array::from_fn(|a| eye[a] as f64 + s * v[a]);
                         let tau = -(1.0 - trilinear(&grid, &opacity, at)).ln();
                         sum += (-(depth + tau * h / 2.0)).exp() * h;
                         depth += tau * h;
