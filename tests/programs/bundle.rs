@@ -102,7 +102,7 @@ fn an_unpacked_bundle_checks_this_device() {
 #[test]
 fn what_fails_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = run(folder.path(), "--minutes 1 --only kernels,gpu -o here");
+    let mut command = run(folder.path(), "--minutes 1 --only devices,kernels,gpu -o here");
     let (code, out, err) = finished(command.env("FAIL", "1"));
     assert_eq!(code, Some(1), "{out}{err}");
     for words in
@@ -110,7 +110,7 @@ fn what_fails_is_named() {
     {
         assert!(out.contains(words), "{words} is not in {out}");
     }
-    let kernels = fs::read_to_string(folder.path().join("here/1-kernels.txt")).unwrap();
+    let kernels = fs::read_to_string(folder.path().join("here/2-kernels.txt")).unwrap();
     assert!(kernels.contains("FAILED   c::fails") && kernels.contains("         the reason"), "{kernels}");
     assert!(!kernels.contains("e::child"), "ignored: {kernels}");
 }
