@@ -23,6 +23,8 @@ const LEFT: f64 = 70.0;
 const TOP: f64 = 66.0;
 const BETWEEN: [f64; 2] = [84.0, 86.0];
 const WIDTH: f64 = LEFT + 2.0 * FRAME[0] + BETWEEN[0] + 24.0;
+/// Height of the legend's three rows.
+const LEGEND: f64 = 64.0;
 
 /// One contender in one panel.
 #[derive(Clone, Debug)]
@@ -79,7 +81,7 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     let ratios = chart.software;
     let legend_top = TOP + 2.0 * FRAME[1] + BETWEEN[1] + 62.0;
     let methods = methods(scenes);
-    let height = legend_top + 44.0 + 15.0 * caption.len() as f64 + 10.0;
+    let height = legend_top + LEGEND + 15.0 * caption.len() as f64 + 10.0;
     let mut drawing = Drawing::new(WIDTH, height);
     let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
     let title = |of: &str| format!("Ambient occlusion after a change: time against error. {of}");
@@ -103,7 +105,7 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     }
     legend(&mut drawing, legend_top, &methods);
     for (n, line) in caption.iter().enumerate() {
-        let y = legend_top + 44.0 + 15.0 * n as f64;
+        let y = legend_top + LEGEND + 15.0 * n as f64;
         drawing.text([LEFT, y], line, 11, Anchor::Start, GREY, false);
     }
     drawing
@@ -237,26 +239,53 @@ fn legend(drawing: &mut Drawing, top: f64, methods: &[&str]) {
             drawing.line([x - 8.0, top], [x + 8.0, top], colour, 5.0, colour == GREY);
         });
     }
-    x = LEFT;
-    let top = top + 20.0;
-    let mut entry = |drawing: &mut Drawing, text: &str, marker: Option<Marker>, hollow: bool| {
-        match marker {
-            Some(marker) => drawing.marker(marker, [x + 8.0, top], RADIUS, INK, hollow),
-            None => drawing.line([x, top], [x + 16.0, top], FRONT, 2.0, false),
+    // Each row: text, its mark or none for the line of the front, hollow.
+    type Entry = (String, Option<Marker>, bool);
+    let rules = Quadrature::ALL.map(|rule| (format!("{} rule", rule.name()), Some(shape(Some(rule))), false));
+    let others: [Entry; 4] = [
+        ("equal weights".into(), Some(Marker::Circle), true),
+        ("weighted rays".into(), Some(Marker::Circle), false),
+        ("no rays".into(), Some(Marker::Diamond), false),
+        ("Pareto front; numbers are rays".into(), None, false),
+    ];
+    for (row, entries) in [&rules[..], &others[..]].into_iter().enumerate() {
+        let (mut x, y) = (LEFT, top + 20.0 * (1 + row) as f64);
+        for (text, marker, hollow) in entries {
+            match marker {
+                Some(marker) => drawing.marker(*marker, [x + 8.0, y], RADIUS, INK, *hollow),
+                None => drawing.line([x, y], [x + 16.0, y], FRONT, 2.0, false),
+            }
+            drawing.text([x + 22.0, y + 4.0], text, 12, Anchor::Start, INK, false);
+            x += 22.0 + text_width(text, 12) + 16.0;
         }
-        drawing.text([x + 22.0, top + 4.0], text, 12, Anchor::Start, INK, false);
-        x += 22.0 + text_width(text, 12) + 16.0;
-    };
-    for rule in Quadrature::ALL {
-        entry(drawing, &format!("{} rule", rule.name()), Some(shape(Some(rule))), false);
     }
-    entry(drawing, "equal weights", Some(Marker::Circle), true);
-    entry(drawing, "weighted rays", Some(Marker::Circle), false);
-    entry(drawing, "no rays", Some(Marker::Diamond), false);
-    entry(drawing, "Pareto front; numbers are rays", None, false);
 }
 
 /// Two numbers with a sign between them, for captions: median and half the distance of the quartiles.
 pub fn with_spread([low, middle, high]: [f64; 3]) -> String {
     format!("{} ± {}", short(middle), short(0.5 * (high - low)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_stays_on_the_sheet_and_above_the_caption() {
+        let mut drawing = Drawing::new(WIDTH, LEGEND);
+        let methods = ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"];
+        legend(&mut drawing, 0.0, &methods);
+        let svg = drawing.svg();
+        let texts: Vec<_> = svg.split("<text ").skip(1).collect();
+        assert_eq!(texts.len(), methods.len() + Quadrature::ALL.len() + 4);
+        for text in texts {
+            let of = |name: &str| -> f64 {
+                let from = text.split(&format!("{name}=\"")).nth(1).unwrap();
+                from.split('"').next().unwrap().parse().unwrap()
+            };
+            let words = text.split(['>', '<']).nth(1).unwrap();
+            assert!(of("x") + text_width(words, 12) <= WIDTH, "{words} leaves the sheet");
+            assert!(of("y") + 12.0 <= LEGEND, "{words} is in the caption");
+        }
+    }
 }
