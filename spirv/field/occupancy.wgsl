@@ -16,28 +16,46 @@ var<immediate> params: OccupancyParams;
 @group(0) @binding(0) var volume: texture_3d<f32>;
 @group(0) @binding(2) var<storage, read_write> occupancy: Occupancy;
 
-// One invocation a brick.
+// Bricks along x that a workgroup takes, and the voxels of their rows with one more at each end.
+const TAKEN = LANES / BRICK;
+const ROW = LANES + 2u;
+
+// Smallest and largest value of the columns of voxels that these bricks and their neighbours' nearest have above a row.
+var<workgroup> columns: array<vec2<f32>, ROW>;
+
+fn joined(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
+    return vec2(min(a.x, b.x), max(a.y, b.y));
+}
+
+// Neighbouring invocations read neighbouring voxels, and neighbouring bricks share what they have in common.
 @compute @workgroup_size(LANES)
-fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = item_of(id, groups);
-    if index >= brick_count(params.bricks) {
-        return;
-    }
-    let corner = vec3<i32>(brick_at(index, params.bricks) * BRICK);
-    let first = max(corner - 1, vec3(0));
-    let last = min(corner + i32(BRICK), vec3<i32>(params.dims) - 1);
-    var low = 3.4e38;
-    var high = -3.4e38;
-    for (var z = first.z; z <= last.z; z++) {
-        for (var y = first.y; y <= last.y; y++) {
-            for (var x = first.x; x <= last.x; x++) {
-                let value = textureLoad(volume, vec3(x, y, z), 0).r * params.scale + params.bias;
-                low = min(low, value);
-                high = max(high, value);
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let first = group * vec3(TAKEN, 1u, 1u);
+    let corner = vec3<i32>(first * BRICK) - 1;
+    let last = vec3<i32>(params.dims) - 1;
+    let low = max(corner, vec3(0));
+    let high = min(corner + i32(BRICK) + 1, last);
+    for (var i = lane; i < ROW; i += LANES) {
+        let x = clamp(corner.x + i32(i), 0, last.x);
+        var range = vec2(3.4e38, -3.4e38);
+        for (var z = low.z; z <= high.z; z++) {
+            for (var y = low.y; y <= high.y; y++) {
+                range = joined(range, vec2(textureLoad(volume, vec3(x, y, z), 0).r * params.scale + params.bias));
             }
         }
+        columns[i] = range;
+    }
+    workgroupBarrier();
+    let brick = first + vec3(lane, 0u, 0u);
+    if lane >= TAKEN || brick.x >= params.bricks.x {
+        return;
+    }
+    var range = columns[lane * BRICK];
+    for (var i = 1u; i < BRICK + 2u; i++) {
+        range = joined(range, columns[lane * BRICK + i]);
     }
     // Filtering rounds; one part in 2^16 of the texel range is more than it can move a value.
     let slack = abs(params.scale) * 1.6e-5;
-    occupancy.visible[index] = select(0u, 1u, largest_opacity(low - slack, high + slack) > 0.0);
+    let opacity = largest_opacity(range.x - slack, range.y + slack);
+    occupancy.visible[brick_index(brick, params.bricks)] = select(0u, 1u, opacity > 0.0);
 }

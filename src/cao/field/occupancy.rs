@@ -1,11 +1,10 @@
 //! Which bricks the ray cast may skip: those in which no value between the smallest and the largest of the brick's voxels
 //! and their neighbours has opacity. Conservative, so skipping changes no picture.
 //!
-//! In: `volume`, `transfer`. Out: `occupancy`, one u32 a brick, x fastest. Cost: two reads a voxel.
+//! In: `volume`, `transfer`. Out: `occupancy`, one u32 a brick, x fastest. Cost: 1.6 reads a voxel.
 
 use crate::field::Field;
 use crate::field::transfer::TransferBuffer;
-use crate::host::rows_over;
 use cao_gpu::Result;
 use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
 use cao_kernels::occupancy as kernel;
@@ -36,7 +35,8 @@ impl Occupancy {
             bias: field.bias,
         };
         let binds = kernel::MainBindings { volume: &field.volume, transfer: &transfer.buffer, occupancy };
-        let groups = rows_over(field.brick_count(), kernel::MAIN_WORKGROUP);
+        let [x, y, z] = field.bricks();
+        let groups = [x.div_ceil(kernel::TAKEN), y, z];
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)
     }
 }
