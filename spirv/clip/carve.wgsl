@@ -47,29 +47,27 @@ var<immediate> params: CarveParams;
 const CUTTING = ALL_CLIPS << CUTTING_AT;
 const OF_INTEREST = VISIBILITY_MASK | CUTTING;
 
-// One invocation a brick.
-@compute @workgroup_size(LANES)
-fn list_bricks(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = item_of(id, groups);
-    if index >= brick_count(bricks_of(params.dims)) {
-        return;
-    }
+// Whether the edit can have changed a brick; notes what the clips do to it.
+fn concerned(index: u32) -> bool {
     // Visibility and the clips that leave it open; how far away they reach is of no interest here.
     let now = clip_bricks.code[index] & OF_INTEREST;
     let before = clip_bricks_before.code[index];
     clip_bricks_before.code[index] = now;
     let cut = ((now | before) & CUTTING) != 0u;
-    if !(params.all == 1u || cut || now != before) {
-        return;
-    }
-    if occupancy.visible[index] == 0u && contact.bits[index] == 0u {
-        return;
-    }
-    let slot = atomicAdd(&growing.count, 1u);
-    growing.items[slot] = index;
-    let through = groups_through(slot);
-    atomicMax(&growing.groups_x, through.x);
-    atomicMax(&growing.groups_y, through.y);
+    let edited = params.all == 1u || cut || now != before;
+    return edited && (occupancy.visible[index] != 0u || contact.bits[index] != 0u);
+}
+
+// One invocation a brick.
+@compute @workgroup_size(LANES)
+fn list_bricks(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = item_of(id, groups);
+    let wanted = index < brick_count(bricks_of(params.dims)) && concerned(index);
+    put_in(index, wanted, lane);
 }
 
 fn value_of(voxel: vec3<u32>) -> f32 {
@@ -127,7 +125,11 @@ fn main(
                 atomicStore(&different, 1u);
             }
             if now > 0u {
-                atomicOr(&found, contact_of(inside));
+                let touched = contact_of(inside);
+                // Most have nothing to add, and additions to one word queue.
+                if (touched & ~atomicLoad(&found)) != 0u {
+                    atomicOr(&found, touched);
+                }
             }
         }
     }

@@ -29,7 +29,7 @@ var<immediate> params: BricksParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
 @group(0) @binding(1) var mask: texture_3d<u32>;
 @group(0) @binding(2) var<storage, read_write> changed_before: ChangedBefore;
-@group(0) @binding(3) var<storage, read_write> list: GrowingList;
+@group(0) @binding(3) var<storage, read_write> growing: GrowingList;
 
 var<workgroup> found: atomic<u32>;
 
@@ -75,11 +75,7 @@ fn main(
             changed_before.flags[index] = now;
         }
         if listed {
-            let slot = atomicAdd(&list.count, 1u);
-            list.items[slot] = index;
-            let through = groups_through(slot);
-            atomicMax(&list.groups_x, through.x);
-            atomicMax(&list.groups_y, through.y);
+            growing.items[places_for(1u)] = index;
         }
     }
 }

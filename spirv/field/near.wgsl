@@ -53,13 +53,8 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     after.squared[index] = least;
 }
 
-// One invocation a brick.
-@compute @workgroup_size(LANES)
-fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = item_of(id, groups);
-    if index >= brick_count(params.bricks) {
-        return;
-    }
+// Whether a brick is to be computed.
+fn chosen(index: u32) -> bool {
     let own = brick_at(index, params.bricks);
     var needed = params.unneeded;
     // The brick's own opacity, or a neighbour's that touches it.
@@ -69,13 +64,21 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
             needed |= contact.bits[brick_index(vec3<u32>(place), params.bricks)] >> u32(26 - n) & 1u;
         }
     }
-    let chosen = needed == 1u && before.squared[index] <= params.reach * params.reach;
-    todo.brick[index] = select(0u, TODO, chosen);
-    if chosen {
-        let slot = atomicAdd(&growing.count, 1u);
-        growing.items[slot] = index;
-        let through = groups_through(slot);
-        atomicMax(&growing.groups_x, through.x);
-        atomicMax(&growing.groups_y, through.y);
+    return needed == 1u && before.squared[index] <= params.reach * params.reach;
+}
+
+// One invocation a brick.
+@compute @workgroup_size(LANES)
+fn choose(
+    @builtin(global_invocation_id) id: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let index = item_of(id, groups);
+    let exists = index < brick_count(params.bricks);
+    let wanted = exists && chosen(index);
+    if exists {
+        todo.brick[index] = select(0u, TODO, wanted);
     }
+    put_in(index, wanted, lane);
 }

@@ -109,7 +109,7 @@ impl Bricks {
             bricks: field.bricks(),
             pad: Default::default(),
         };
-        let binds = kernel::MainBindings { opacity, mask, changed_before, list: &list.buffer };
+        let binds = kernel::MainBindings { opacity, mask, changed_before, growing: &list.buffer };
         let groups = row_of_groups(field.brick_count());
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
         rec.barrier(
