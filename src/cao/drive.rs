@@ -230,7 +230,7 @@ pub fn in_parts(
         total_ms += rec.submit_and_wait()?.total();
         done += now;
         progress(f64::from(done) / f64::from(count));
-        let pace = 0.1 / start.elapsed().as_secs_f64().max(1e-4);
+        let pace = TENTH_MS / (1e3 * start.elapsed().as_secs_f64()).max(0.1);
         part = (f64::from(now) * pace.clamp(0.25, 4.0)).clamp(1.0, 1e7) as u32;
     }
     Ok(total_ms)

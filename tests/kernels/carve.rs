@@ -106,7 +106,7 @@ impl<'a> Bench<'a> {
                 list: &self.list,
                 opacity: &self.opacity,
             };
-            carve.record(rec, &self.field, samples, transfer.is_some(), classify, b).unwrap();
+            carve.record(rec, &self.field, samples, transfer.is_some(), b).unwrap();
             let (set, words) = (&self.set, &self.words[2]);
             let (full, clipped, mask) = (&self.full, &self.clipped, &self.mask);
             classify.record(rec, &self.field, set, samples, 1.0, false, words, full, clipped, mask).unwrap();

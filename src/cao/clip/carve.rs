@@ -6,8 +6,8 @@
 //! opacity changed, left alone elsewhere). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
 //! voxel in the others, clip samples only where a clip's surface passes.
 
-use crate::clip::classify::Classify;
 use crate::clip::clips::ClipSet;
+use crate::clip::positions;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use crate::field::transfer::TransferBuffer;
@@ -44,24 +44,27 @@ pub struct Bindings<'a> {
 pub struct Carve {
     choose: Pipeline,
     carve: Pipeline,
+    positions: Buffer,
 }
 
 impl Carve {
-    /// Builds the pipelines.
+    /// Builds the pipelines and the table of sample positions. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let shader = &kernel::SHADER;
-        Ok(Self { choose: gpu.compute(shader, "list_bricks")?, carve: gpu.compute(shader, "main")? })
+        Ok(Self {
+            choose: gpu.compute(shader, "list_bricks")?,
+            carve: gpu.compute(shader, "main")?,
+            positions: positions::buffer(gpu)?,
+        })
     }
 
-    /// Brings V_o up to date: every brick if `all`, those that clips can have changed otherwise. `positions` are those of
-    /// [`Classify`].
+    /// Brings V_o up to date: every brick if `all`, those that clips can have changed otherwise.
     pub fn record(
         &self,
         rec: &mut Recorder,
         field: &Field,
         samples: AntiAliasing,
         all: bool,
-        classify: &Classify,
         b: Bindings,
     ) -> Result<()> {
         let Field { dims, spacing, levels, bias, .. } = *field;
@@ -96,7 +99,7 @@ impl Carve {
             transfer: &b.transfer.buffer,
             clips: &b.clips.clips,
             layers: &b.clips.layers,
-            positions: &classify.positions,
+            positions: &self.positions,
             clip_bricks: b.clip_bricks,
             contact: b.contact,
             change: b.change,

@@ -6,8 +6,8 @@
 //! where the brick's word leaves it open; 9 or 9 + N samples only for voxels that a clip's surface may pass.
 
 use crate::clip::clips::ClipSet;
+use crate::clip::positions;
 use crate::field::Field;
-use crate::host::device_buffer;
 use cao_gpu::Result;
 use cao_gpu::{Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
 use cao_kernels::classify as kernel;
@@ -15,13 +15,10 @@ pub use cao_kernels::shared::categories::{AFFECTED, CLIPPED, UNTOUCHED};
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::AntiAliasing;
 
-const _: () = assert!(kernel::MOST_SAMPLES == AntiAliasing::N32 as u32);
-
 /// The kernel `classify`.
 pub struct Classify {
     pipeline: Pipeline,
-    /// The N extra positions of eq. (5), a uniform buffer.
-    pub positions: Buffer,
+    positions: Buffer,
     /// Voxels of category a, b, c after the last classification, see [`Self::count_of`].
     pub count: Buffer,
 }
@@ -31,7 +28,7 @@ impl Classify {
     pub fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
             pipeline: gpu.compute(&kernel::SHADER, "main")?,
-            positions: device_buffer(gpu, "sample positions", bytemuck::bytes_of(&sample_positions()))?,
+            positions: positions::buffer(gpu)?,
             count: gpu.buffer("category counts", size_of::<kernel::Count>() as u64, BufferUse::Device)?,
         })
     }
@@ -85,16 +82,4 @@ impl Classify {
         let count: kernel::Count = bytemuck::pod_read_unaligned(content);
         count.category[category as usize]
     }
-}
-
-/// The N extra positions in the voxel's [−1, 1]³: points of the R3 sequence (Roberts 2018), whose every prefix is evenly
-/// spread, each followed by its mirror image, so that the mean of every even number of them is the centre.
-fn sample_positions() -> kernel::Positions {
-    const G: f64 = 1.220_744_084_605_759_5;
-    let sample = std::array::from_fn(|k| {
-        let side = if k % 2 == 0 { 1.0 } else { -1.0 };
-        let u = |power: i32| (0.5 + (k / 2 + 1) as f64 / G.powi(power)).fract();
-        [1, 2, 3, 0].map(|axis| if axis == 0 { 0.0 } else { (side * (2.0 * u(axis) - 1.0)) as f32 })
-    });
-    kernel::Positions { sample }
 }

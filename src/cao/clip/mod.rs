@@ -6,3 +6,4 @@ pub mod clip_bricks;
 pub mod clips;
 pub mod dilate;
 pub mod peel;
+mod positions;

@@ -8,7 +8,7 @@ use super::rays::{Bindings, RayPlan, Rays};
 use crate::Result;
 use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed};
 use crate::clip::carve::{self, Carve};
-use crate::clip::classify::{AFFECTED, Classify, UNTOUCHED};
+use crate::clip::classify::{AFFECTED, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
 use crate::drive::{self, Pace, Part};
 use crate::field::bricks::BrickList;
@@ -77,7 +77,6 @@ impl Volumes {
 /// The kernels.
 struct Kernels {
     clip_bricks: ClipBricks,
-    classify: Classify,
     carve: Carve,
     near: Near,
     rays: Rays,
@@ -88,7 +87,6 @@ impl Kernels {
     fn new(gpu: &Gpu) -> Result<Self> {
         Ok(Self {
             clip_bricks: ClipBricks::new(gpu)?,
-            classify: Classify::new(gpu)?,
             carve: Carve::new(gpu)?,
             near: Near::new(gpu)?,
             rays: Rays::new(gpu)?,
@@ -139,7 +137,6 @@ impl Traced {
                 &on.field,
                 on.setup.anti_aliasing,
                 changed.opacities,
-                &k.classify,
                 carve::Bindings {
                     transfer: &on.transfer_buffer,
                     clips: &on.clip_set,
