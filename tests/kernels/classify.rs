@@ -1,10 +1,7 @@
 //! The kernel `classify` against its twin: clipped opacity, category of every voxel, counts.
 
-use cao::clip::classify::Classify;
+use crate::clipping::{Clipped, Kernels};
 use cao::clip::clip_bricks::ClipBricks;
-use cao::clip::clips::ClipSet;
-use cao::clip::dilate::Dilate;
-use cao::clip::peel::Peel;
 use cao::field::volume_image;
 use cao_gpu::{Access, Format, Gpu};
 use cao_measure::random::Random;
@@ -31,29 +28,17 @@ const MESH_POSITION: f32 = 1e-5;
 /// Share of the voxels that may be so near.
 const UNDECIDED: f32 = 0.02;
 
-struct Bench<'a> {
-    gpu: &'a Gpu,
-    classify: Classify,
-    clip_bricks: ClipBricks,
-    peel: Peel,
-    dilate: Dilate,
-}
-
 struct Found {
     opacity: Vec<f32>,
     mask: Vec<u8>,
     count: [u32; 3],
 }
 
+struct Bench<'a>(Kernels<'a>);
+
 impl<'a> Bench<'a> {
     fn new(gpu: &'a Gpu) -> Self {
-        Self {
-            gpu,
-            classify: Classify::new(gpu).unwrap(),
-            clip_bricks: ClipBricks::new(gpu).unwrap(),
-            peel: Peel::new(gpu).unwrap(),
-            dilate: Dilate::new(gpu).unwrap(),
-        }
+        Self(Kernels::new(gpu))
     }
 
     fn run(
@@ -65,31 +50,24 @@ impl<'a> Bench<'a> {
         samples: AntiAliasing,
         maps: MapSettings,
     ) -> Found {
-        let gpu = self.gpu;
-        let field = blank(gpu, grid);
-        let reach = Classify::reach(&field, occlusion);
-        let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
-        let mut set = ClipSet::new(gpu).unwrap();
-        let half_mm =
-            0.5 * glam::DVec3::from_array(grid.dims.map(|d| d as f64)).length() as f32 * field.diagonal();
-        set.prepare(gpu, &self.peel, &self.dilate, clips, radius, half_mm, maps).unwrap();
+        let Kernels { gpu, classify, clip_bricks, .. } = &self.0;
+        let Clipped { field, set, reach } = self.0.clipped(grid, clips, occlusion, maps);
         let full = float_image(gpu, &field, full);
         let opacity = volume_image(gpu, "opacity", &field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", &field, Format::R8Uint).unwrap();
-        let count = &self.classify.count;
+        let count = &classify.count;
         let words = ClipBricks::buffer(gpu, &field).unwrap();
         run(gpu, |rec| {
             rec.discard(&opacity);
             rec.discard(&mask);
-            set.record(rec, clips, half_mm).unwrap();
             rec.fill(count, 0, count.bytes(), 0).unwrap();
-            self.clip_bricks.record(rec, &field, &set, reach, &words).unwrap();
+            clip_bricks.record(rec, &field, &set, reach, &words).unwrap();
             rec.barrier(
                 &[Access::TransferWrite, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite],
             );
             let literal = maps.literal;
-            self.classify
+            classify
                 .record(rec, &field, &set, samples, reach, literal, &words, &full, &opacity, &mask)
                 .unwrap();
         });
@@ -111,7 +89,7 @@ impl<'a> Bench<'a> {
             let mut field = ClipField::new(clip, grid, reach, &plan).unwrap();
             if let (Shape::Mesh(mesh), Some(twin)) = (&clip.shape, &mut field.mesh) {
                 let camera = twin.layers.camera;
-                let found = self.peel.run(self.gpu, mesh, clip.pose.scale, camera, 2).unwrap();
+                let found = self.0.peel.run(self.0.gpu, mesh, clip.pose.scale, camera, 2).unwrap();
                 let size = (camera.resolution * camera.resolution) as usize;
                 let map = |n: usize, none: f32| -> Vec<f32> {
                     found.depth[n * size..(n + 1) * size]

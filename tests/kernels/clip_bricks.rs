@@ -1,12 +1,8 @@
 //! The kernel `clip_bricks`: what it says of a brick holds for every sample of its voxels, by its twin, and the
 //! classification that trusts it is the same, bit for bit, as one that looks at every sample.
 
-use cao::clip::classify::Classify;
+use crate::clipping::{Clipped, Kernels};
 use cao::clip::clip_bricks::{ClipBricks, UNKNOWN};
-use cao::clip::clips::ClipSet;
-use cao::clip::dilate::Dilate;
-use cao::clip::peel::Peel;
-use cao::field::Field;
 use cao::field::volume_image;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
@@ -31,19 +27,11 @@ const MAPS: MapSettings = MapSettings { resolution: 96, cells: 48, pairs: 4, lit
 const LARGE: [Grid; 2] =
     [Grid { dims: [44, 33, 26], spacing: [1.0; 3] }, Grid { dims: [25, 40, 31], spacing: [1.25, 0.8, 1.0] }];
 
-struct Bench<'a> {
-    gpu: &'a Gpu,
-    classify: Classify,
-    kernel: ClipBricks,
-    peel: Peel,
-    dilate: Dilate,
-}
+struct Bench<'a>(Kernels<'a>);
 
 /// Clips on the device in front of a volume.
 struct Scene {
-    field: Field,
-    set: ClipSet,
-    reach: f32,
+    clipped: Clipped,
     full: Image,
     literal: bool,
 }
@@ -57,48 +45,36 @@ struct Found {
 
 impl<'a> Bench<'a> {
     fn new(gpu: &'a Gpu) -> Self {
-        Self {
-            gpu,
-            classify: Classify::new(gpu).unwrap(),
-            kernel: ClipBricks::new(gpu).unwrap(),
-            peel: Peel::new(gpu).unwrap(),
-            dilate: Dilate::new(gpu).unwrap(),
-        }
+        Self(Kernels::new(gpu))
     }
 
     fn scene(&self, grid: &Grid, clips: &[Clip], radius_mm: f32, maps: MapSettings) -> Scene {
-        let gpu = self.gpu;
-        let field = blank(gpu, grid);
         let occlusion = Occlusion { radius_mm, ..Occlusion::paper(grid.min_spacing()) };
-        let reach = Classify::reach(&field, &occlusion);
-        let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
-        let half_mm = 0.5 * size_mm(grid).length();
-        let mut set = ClipSet::new(gpu).unwrap();
-        set.prepare(gpu, &self.peel, &self.dilate, clips, radius, half_mm, maps).unwrap();
-        run(gpu, |rec| set.record(rec, clips, half_mm).unwrap());
+        let clipped = self.0.clipped(grid, clips, &occlusion, maps);
         // Without zeros: what is hidden must be seen to be.
         let mut random = Random::new(1);
         let full: Vec<f32> = (0..grid.len()).map(|_| random.between(0.1, 1.0)).collect();
-        let full = float_image(gpu, &field, &full);
-        Scene { field, set, reach, full, literal: maps.literal }
+        let full = float_image(self.0.gpu, &clipped.field, &full);
+        Scene { clipped, full, literal: maps.literal }
     }
 
     fn bricks(&self, scene: &Scene) -> Buffer {
-        let words = ClipBricks::buffer(self.gpu, &scene.field).unwrap();
-        run(self.gpu, |rec| {
-            self.kernel.record(rec, &scene.field, &scene.set, scene.reach, &words).unwrap();
-        });
+        let Clipped { field, set, reach } = &scene.clipped;
+        let words = ClipBricks::buffer(self.0.gpu, field).unwrap();
+        run(self.0.gpu, |rec| self.0.clip_bricks.record(rec, field, set, *reach, &words).unwrap());
         words
     }
 
     fn unknown(&self, scene: &Scene) -> Buffer {
-        let words = ClipBricks::buffer(self.gpu, &scene.field).unwrap();
-        run(self.gpu, |rec| rec.fill(&words, 0, words.bytes(), UNKNOWN).unwrap());
+        let words = ClipBricks::buffer(self.0.gpu, &scene.clipped.field).unwrap();
+        run(self.0.gpu, |rec| rec.fill(&words, 0, words.bytes(), UNKNOWN).unwrap());
         words
     }
 
     fn classify(&self, scene: &Scene, words: &Buffer, samples: AntiAliasing) -> Found {
-        let (gpu, field, count) = (self.gpu, &scene.field, &self.classify.count);
+        let Kernels { gpu, classify, .. } = &self.0;
+        let Scene { clipped: Clipped { field, set, reach }, full, literal } = scene;
+        let count = &classify.count;
         let opacity = volume_image(gpu, "opacity", field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", field, Format::R8Uint).unwrap();
         run(gpu, |rec| {
@@ -106,8 +82,7 @@ impl<'a> Bench<'a> {
             rec.discard(&mask);
             rec.fill(count, 0, count.bytes(), 0).unwrap();
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-            let Scene { set, reach, full, literal, .. } = scene;
-            self.classify
+            classify
                 .record(rec, field, set, samples, *reach, *literal, words, full, &opacity, &mask)
                 .unwrap();
         });

@@ -5,6 +5,7 @@ mod bricks;
 mod carve;
 mod classify;
 mod clip_bricks;
+mod clipping;
 mod dilate;
 mod lao;
 mod near;
