@@ -1,5 +1,4 @@
-// Stage 6 of CAO section 3.5: the volume by ray casting, all views in one multiview pass. Front to back, early
-// termination, leaps over bricks that show nothing, clipped samples skipped by the shadow test of section 3.2, ambient factor
+// Stage 6 of CAO section 3.5: the volume by ray casting, all views in one dispatch. Front to back, early termination, leaps over bricks that show nothing, clipped samples skipped by the shadow test of section 3.2, ambient factor
 // from V_AO at every sample that shows anything.
 
 #include "shared/transfer.wgsl"
@@ -15,6 +14,10 @@
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 
+// a layer a view: premultiplied, linear; Vulkan's 0 ... 1
+@group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
+@group(0) @binding(11) var depths: texture_storage_2d_array<r32float, write>;
+
 #include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
@@ -22,28 +25,19 @@
 
 struct RaycastParams {
     // pixels of one view
-    size: vec2<f32>,
+    size: vec2<u32>,
 }
 
 struct Pixel {
     // premultiplied, linear
-    @location(0) colour: vec4<f32>,
-    @builtin(frag_depth) depth: f32,
+    colour: vec4<f32>,
+    depth: f32,
 }
 
 var<immediate> params: RaycastParams;
 
-// Vertices to draw.
-const CORNERS = 6u;
-
-// Two triangles that make a rectangle of the whole image: one large triangle would do, but the software driver of Mesa 22.3
-// forgets the view of triangles that are not half of an upright rectangle.
-@vertex
-fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
-    let right = index == 2u || index == 3u || index == 5u;
-    let below = index == 1u || index == 4u || index == 5u;
-    return vec4(select(-1.0, 1.0, right), select(-1.0, 1.0, below), 0.0, 1.0);
-}
+// Pixels along the edge of a workgroup's tile: its rays read nearly the same bricks.
+const TILE = 8u;
 
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
 const LEAP_MARGIN = 0.1;
@@ -90,17 +84,15 @@ fn ends(colour: vec3<f32>, alpha: f32) -> bool {
     return rest * min(12.92, 0.4396 * pow(darkest, -7.0 / 12.0)) <= frame.remainder;
 }
 
-@fragment
-fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32) -> Pixel {
-    let uv = place.xy / params.size;
-    let eye = frame.eye[view];
-    let ray = ray_through(eye, uv);
+// What an eye sees at a place in pixels.
+fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
+    let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
 
     let exponent = frame.spacing.w / frame.light.w;
     // Interleaved gradient noise (Jimenez 2014) against banding.
-    let noise = fract(52.9829189 * fract(dot(place.xy, vec2(0.06711056, 0.00583715))));
+    let noise = fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
     let phase = select(0.5, noise, frame.jitter > 0.0);
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
     let last_brick = vec3<i32>(bricks) - 1;
@@ -184,4 +176,14 @@ fn fragment(@builtin(position) place: vec4<f32>, @builtin(view_index) view: u32)
         }
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(id.xy >= params.size) {
+        return;
+    }
+    let pixel = seen(frame.eye[id.z], vec2<f32>(id.xy) + 0.5);
+    textureStore(colours, id.xy, id.z, pixel.colour);
+    textureStore(depths, id.xy, id.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
 }

@@ -1,7 +1,7 @@
 //! The frame: what changed, which parts run for it, all views drawn.
 //!
 //! ```text
-//! volume ─ [occupancy] ─ [parts of the method: opacity, clips, ambient] ─ [distances] ─ [raycast, all views]
+//! volume ─ [occupancy] ─ [parts of the method: opacity, clips, ambient] ─ [distances] ─ [raycast, all views] ─ [present]
 //! ```
 //!
 //! `set_*` say what the scene is; `record_*` write the work that this needs into a command buffer and never touch a queue,
@@ -9,7 +9,9 @@
 
 use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::brick_distance::BrickDistance;
-use crate::draw::eyes::{FrameBuffer, check_count};
+use crate::draw::eyes::FrameBuffer;
+use crate::draw::picture::Picture;
+use crate::draw::present::Present;
 use crate::draw::raycast::{Bindings, Raycast};
 use crate::drive::{self, Pace, Part};
 use crate::field::Field;
@@ -19,18 +21,16 @@ use crate::method;
 use crate::stages;
 use crate::subject::Subject;
 use crate::{Error, Result};
-use cao_gpu::{
-    Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Phase, Recorder, Timings,
-};
+use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Phase, Recorder, Timings};
 use cao_model::clip::Clip;
 use cao_model::look::Look;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
 use cao_model::volume::Volume;
+use std::sync::{Mutex, PoisonError};
 
-/// Format of the colour images that [`Renderer::draw`] makes.
-pub const COLOUR: Format = Format::Rgba32Float;
+pub use crate::draw::picture::COLOUR;
 
 /// The images of all views, left and right first, read back from the device.
 #[derive(Clone, Debug)]
@@ -51,7 +51,10 @@ pub struct Renderer {
     /// How far rays may leap.
     distances: Buffer,
     raycast: Raycast,
+    present: Present,
     frame: FrameBuffer,
+    /// What is presented; kept from frame to frame.
+    presented: Mutex<Option<Picture>>,
     changed: Changed,
     pace: Pace,
     /// Times of preparing clip meshes since the last update.
@@ -73,8 +76,10 @@ impl Renderer {
             ambient: method::of(&subject)?,
             brick_distance: BrickDistance::new(gpu, &subject.field)?,
             distances: BrickDistance::buffer(gpu, &subject.field)?,
-            raycast: Raycast::new(gpu, colour)?,
+            raycast: Raycast::new(gpu)?,
+            present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
+            presented: Mutex::new(None),
             subject,
             changed: Changed::ALL,
             pace: Pace::default(),
@@ -219,20 +224,29 @@ impl Renderer {
         }
     }
 
-    /// Records one to four views ([`View::MAX`]) into as many layers of `colour` and `depth` (`D32Float`), in one multiview pass. Refuses
-    /// while the ambient volume is out of date. Numbers other than two build a pipeline when they first come.
-    pub fn record_draw(
+    /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
+    /// can read it afterwards. Refuses while the ambient volume is out of date.
+    pub fn record_picture(
         &self,
         rec: &mut Recorder,
         views: &[View],
         look: &Look,
-        colour: &Image,
-        depth: &Image,
-        size: [u32; 2],
+        picture: &Picture,
     ) -> Result<()> {
         self.current()?;
+        if picture.views() != views.len() {
+            let problem = format!("has room for {} views, given are {}", picture.views(), views.len());
+            return Err(Error::refused("picture", problem));
+        }
         let (subject, fields) = (&self.subject, self.ambient.fields());
         self.frame.record(rec, &subject.field, views, look, subject.reference_mm())?;
+        rec.barrier(
+            &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead, Access::StorageWrite],
+            &[Access::StorageWrite],
+        );
+        rec.discard(&picture.colour);
+        rec.discard(&picture.depth);
+        rec.barrier(&[], &[Access::StorageWrite]);
         rec.stage(stages::RAYCAST)?;
         let bindings = Bindings {
             field: &subject.field,
@@ -243,7 +257,37 @@ impl Renderer {
             clips: &subject.clip_set,
             frame: &self.frame,
         };
-        self.raycast.record(rec, bindings, views.len(), colour, depth, size)?;
+        self.raycast.record(rec, bindings, picture)?;
+        rec.end_stage()?;
+        rec.barrier(
+            &[Access::StorageWrite],
+            &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead],
+        );
+        Ok(())
+    }
+
+    /// Records the same into as many layers of attachments: `colour` of the renderer's format, `depth` of `D32Float`. The picture between
+    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then.
+    pub fn record_draw(
+        &self,
+        rec: &mut Recorder,
+        views: &[View],
+        look: &Look,
+        colour: &Image,
+        depth: &Image,
+        size: [u32; 2],
+    ) -> Result<()> {
+        self.current()?;
+        let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
+        let picture = match presented.take().filter(fits) {
+            Some(picture) => picture,
+            None => Picture::new(&self.subject.gpu, size, views.len())?,
+        };
+        let picture = presented.insert(picture);
+        self.record_picture(rec, views, look, picture)?;
+        rec.stage(stages::PRESENT)?;
+        self.present.record(rec, picture, colour, depth)?;
         rec.end_stage()?;
         Ok(())
     }
@@ -257,40 +301,23 @@ impl Renderer {
         size: [u32; 2],
     ) -> Result<(StereoImage<VIEWS>, Timings)> {
         self.current()?;
-        check_count(VIEWS)?;
         if size.contains(&0) {
             let problem = format!("{} x {}; expected at least 1 x 1 pixels", size[0], size[1]);
             return Err(Error::refused("image size", problem));
         }
-        let target = |name, format, extra| {
-            self.subject.gpu.image(
-                name,
-                &ImageDesc {
-                    dims: [size[0], size[1], 1],
-                    layers: VIEWS as u32,
-                    format,
-                    kind: ImageKind::D2,
-                    usage: ImageUse::ATTACHMENT | extra,
-                },
-            )
-        };
-        let colour = target("colour", COLOUR, ImageUse::SAMPLED)?;
-        let depth = target("depth", Format::D32Float, ImageUse::SAMPLED)?;
+        let gpu = &self.subject.gpu;
+        let picture = Picture::new(gpu, size, VIEWS)?;
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let read_back = |bytes| self.subject.gpu.buffer("image read-back", bytes, BufferUse::Readback);
+        let read_back = |bytes| gpu.buffer("image read-back", bytes, BufferUse::Readback);
         let colours = (0..VIEWS).map(|_| read_back(16 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
         let depths = (0..VIEWS).map(|_| read_back(4 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
 
-        let mut rec = self.subject.gpu.recorder("draw")?;
-        rec.discard(&colour);
-        rec.discard(&depth);
-        rec.barrier(&[], &[Access::AttachmentWrite]);
-        self.record_draw(&mut rec, views, look, &colour, &depth, size)?;
-        rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
+        let mut rec = gpu.recorder("draw")?;
+        self.record_picture(&mut rec, views, look, &picture)?;
         for eye in 0..VIEWS {
             let extent = [size[0], size[1], 1];
-            rec.copy_image_to_buffer(&colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
-            rec.copy_image_to_buffer(&depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
+            rec.copy_image_to_buffer(&picture.colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
+            rec.copy_image_to_buffer(&picture.depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
         }
         rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
         let timings = rec.submit_and_wait()?;

@@ -34,3 +34,5 @@ pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
 /// The picture.
 pub const RAYCAST: Stage = Stage::new("raycast", Phase::Draw);
+/// The picture into a host's attachments.
+pub const PRESENT: Stage = Stage::new("present", Phase::Draw);

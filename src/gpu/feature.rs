@@ -105,7 +105,6 @@ const SAMPLED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::SAMPLED_IMAGE;
 const FILTERED: vk::FormatFeatureFlags =
     flags(&[SAMPLED, vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR]);
 const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
-const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
 
 /// Required uses of formats. `R16_UNORM` is optional: not filtered, 16-bit values become f32 texels (`Gpu::filters`); not
 /// filtered and stored, there are no rays by brick (`Gpu::stores`).
@@ -117,7 +116,11 @@ pub const FORMATS: &[FormatNeed] = &[
     },
     FormatNeed { format: vk::Format::R8_UNORM, features: FILTERED, why: "8-bit values" },
     FormatNeed { format: vk::Format::R8_UINT, features: flags(&[SAMPLED, STORAGE]), why: "masks" },
-    FormatNeed { format: vk::Format::R32G32B32A32_SFLOAT, features: COLOUR, why: "pictures" },
+    FormatNeed {
+        format: vk::Format::R32G32B32A32_SFLOAT,
+        features: flags(&[SAMPLED, STORAGE]),
+        why: "pictures",
+    },
     FormatNeed {
         format: vk::Format::D32_SFLOAT,
         features: flags(&[vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT, SAMPLED]),

@@ -12,6 +12,7 @@ mod near;
 mod occupancy;
 mod opacity;
 mod peel;
+mod present;
 mod raycast;
 mod rays;
 mod reference;

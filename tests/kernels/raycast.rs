@@ -8,6 +8,7 @@ use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
 use cao::draw::brick_distance::BrickDistance;
 use cao::draw::eyes::FrameBuffer;
+use cao::draw::picture::Picture;
 use cao::draw::raycast::{Bindings, Raycast};
 use cao::field::Field;
 use cao::field::occupancy::Occupancy;
@@ -448,7 +449,7 @@ impl Stages {
             transfer: TransferBuffer::new(gpu).unwrap(),
             clips: ClipSet::new(gpu).unwrap(),
             frame: FrameBuffer::new(gpu).unwrap(),
-            raycast: Raycast::new(gpu, COLOUR).unwrap(),
+            raycast: Raycast::new(gpu).unwrap(),
             distances: BrickDistance::buffer(gpu, &field).unwrap(),
             field,
         };
@@ -481,12 +482,8 @@ impl Stages {
 
     /// Left and right colour and depth as bytes, with these words of the bricks' distances.
     fn draw(&self, gpu: &Gpu, views: &[View; 2], look: &Look, distances: &[u32]) -> Vec<Vec<u8>> {
-        let attachment = |format| {
-            let usage = ImageUse::ATTACHMENT;
-            let dims = [SIZE[0], SIZE[1], 1];
-            gpu.image("eyes", &ImageDesc { dims, layers: 2, format, kind: ImageKind::D2, usage }).unwrap()
-        };
-        let (colour, depth) = (attachment(COLOUR), attachment(Format::D32Float));
+        let picture = Picture::new(gpu, SIZE, 2).unwrap();
+        let Picture { colour, depth } = &picture;
         let distances = buffer(gpu, "words", bytemuck::cast_slice(distances));
         let bindings = Bindings {
             field: &self.field,
@@ -501,16 +498,16 @@ impl Stages {
         let back = |image: &Image| {
             gpu.buffer("back", texels * image.desc().format.bytes(), BufferUse::Readback).unwrap()
         };
-        let backs = [back(&colour), back(&colour), back(&depth), back(&depth)];
+        let backs = [back(colour), back(colour), back(depth), back(depth)];
         run(gpu, |rec| {
-            rec.discard(&colour);
-            rec.discard(&depth);
+            rec.discard(colour);
+            rec.discard(depth);
             self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
-            rec.barrier(&[], &[Access::AttachmentWrite]);
-            self.raycast.record(rec, bindings, views.len(), &colour, &depth, SIZE).unwrap();
-            rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
+            rec.barrier(&[], &[Access::StorageWrite]);
+            self.raycast.record(rec, bindings, &picture).unwrap();
+            rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
             for (n, back) in backs.iter().enumerate() {
-                let image = if n < 2 { &colour } else { &depth };
+                let image = if n < 2 { colour } else { depth };
                 rec.copy_image_to_buffer(image, n as u32 % 2, [0; 3], [SIZE[0], SIZE[1], 1], back, 0)
                     .unwrap();
             }

@@ -81,7 +81,7 @@ fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
         r.record_update(&mut rec).unwrap();
         r.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, size).unwrap();
         let stages: Vec<_> = rec.submit_and_wait().unwrap().into_iter().map(|t| t.stage).collect();
-        assert_eq!(stages.last(), Some(&cao::stages::RAYCAST), "{stages:?}");
+        assert!(stages.ends_with(&[cao::stages::RAYCAST, cao::stages::PRESENT]), "{stages:?}");
 
         let (drawn, _) = r.draw(&views, &Look::default(), size).unwrap();
         let bytes = u64::from(size[0] * size[1]) * 16;
@@ -200,6 +200,8 @@ fn what_is_out_of_date_is_neither_drawn_nor_read() {
 #[test]
 fn an_update_is_one_submission_of_few_commands() {
     const COMMANDS: u64 = 40;
+    // A machine that does other things is slow for a while, not for so many updates.
+    const TRIES: u32 = 50;
     let gpu = cao_testing::open();
     let volume = cao_formats::open("builtin:engine:24").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
@@ -229,9 +231,8 @@ fn an_update_is_one_submission_of_few_commands() {
             r.update(&mut |_| ()).unwrap();
             gpu.counts() - before
         };
-        let tries: Vec<_> = (0..5).map(|_| update()).collect();
-        let asked =
-            tries.iter().find(|asked| asked.submissions == 1).unwrap_or_else(|| panic!("{what}: {tries:?}"));
+        let asked = (0..TRIES).map(|_| update()).find(|asked| asked.submissions == 1);
+        let asked = asked.unwrap_or_else(|| panic!("{what}: always more than one submission"));
         assert!(asked.commands <= COMMANDS && asked.calls < 6 * COMMANDS, "{what}: {asked:?}");
 
         change(&mut r);

@@ -1,5 +1,7 @@
-//! Pictures: eyes, ray cast, how far its rays may leap.
+//! Pictures: eyes, ray cast, how far its rays may leap, attachments of hosts.
 
 pub mod brick_distance;
 pub mod eyes;
+pub mod picture;
+pub mod present;
 pub mod raycast;

@@ -4,8 +4,9 @@ use super::path;
 use super::way::Way;
 use anyhow::{Context, Result};
 use cao::ambient::Categories;
+use cao::draw::picture::Picture;
 use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::{Access, Counts, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Timings};
+use cao_gpu::{Counts, Gpu, Timings};
 use cao_measure::split::Split;
 use cao_model::clip::Shape;
 use cao_model::settings::Setup;
@@ -95,34 +96,9 @@ impl Measured {
 /// A method's renderer in one configuration.
 struct Runner<'a> {
     configuration: &'a Configuration,
-    target: Rc<Target>,
+    target: Rc<Picture>,
     renderer: Renderer,
     measured: Measured,
-}
-
-/// The images that all methods of a configuration draw to.
-struct Target {
-    colour: Image,
-    depth: Image,
-}
-
-impl Target {
-    fn new(gpu: &Gpu, configuration: &Configuration) -> Result<Self> {
-        let image = |name, format| {
-            let [width, height] = configuration.size;
-            let layers = configuration.views as u32;
-            let usage = ImageUse::ATTACHMENT;
-            let kind = ImageKind::D2;
-            gpu.image(name, &ImageDesc { dims: [width, height, 1], layers, format, kind, usage })
-        };
-        let target = Self { colour: image("colour", COLOUR)?, depth: image("depth", Format::D32Float)? };
-        let mut rec = gpu.recorder("images")?;
-        rec.discard(&target.colour);
-        rec.discard(&target.depth);
-        rec.barrier(&[], &[Access::AttachmentWrite]);
-        rec.submit_and_wait()?;
-        Ok(target)
-    }
 }
 
 /// Draws the path with all methods of all configurations in turn, frame by frame, so that all can be compared with one another.
@@ -136,7 +112,7 @@ pub fn measure(
     let mut runners = Vec::new();
     for configuration in configurations {
         let Configuration { size: [width, height], views, .. } = configuration;
-        let target = Target::new(gpu, configuration)
+        let target = Picture::new(gpu, [*width, *height], *views)
             .with_context(|| format!("pictures of {views} views of {width} x {height} pixels"))?;
         let target = Rc::new(target);
         for &method in &plan.methods {
@@ -165,7 +141,7 @@ impl<'a> Runner<'a> {
     fn new(
         gpu: &Gpu,
         configuration: &'a Configuration,
-        target: &Rc<Target>,
+        target: &Rc<Picture>,
         plan: &Plan,
         method: Way,
     ) -> Result<Self> {
@@ -198,8 +174,7 @@ impl<'a> Runner<'a> {
         let before = Instant::now();
         self.renderer.record_update(&mut rec)?;
         let (recording, asked) = (before.elapsed().as_secs_f64() * 1e3, rec.counts());
-        let Target { colour, depth } = &*self.target;
-        self.renderer.record_draw(&mut rec, &views, &look, colour, depth, *size)?;
+        self.renderer.record_picture(&mut rec, &views, &look, &self.target)?;
         let stages = rec.submit_and_wait()?;
         let wall = start.elapsed().as_secs_f64() * 1e3;
 

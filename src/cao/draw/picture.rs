@@ -1,0 +1,45 @@
+//! The images that a ray cast writes.
+
+use crate::Result;
+use crate::draw::eyes::check_count;
+use cao_gpu::{Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+
+/// Format of a picture's colour.
+pub const COLOUR: Format = Format::Rgba32Float;
+/// Format of its depth.
+pub const DEPTH: Format = Format::R32Float;
+
+/// One to four views of one size on the device, a layer each.
+pub struct Picture {
+    /// Premultiplied linear RGBA, [`COLOUR`].
+    pub colour: Image,
+    /// Vulkan's depth, 0 … 1, [`DEPTH`]; 1 where nothing is drawn.
+    pub depth: Image,
+}
+
+impl Picture {
+    /// Memory for a picture, 20 bytes a pixel and view; content undefined.
+    ///
+    /// # Errors
+    /// [`cao_model::Error`] for no views or more than [`cao_model::view::View::MAX`], those of the device for what it cannot hold.
+    pub fn new(gpu: &Gpu, size: [u32; 2], views: usize) -> Result<Self> {
+        check_count(views)?;
+        let image = |name, format| {
+            let usage = ImageUse::STORAGE | ImageUse::SAMPLED;
+            let (dims, layers) = ([size[0], size[1], 1], views as u32);
+            gpu.image(name, &ImageDesc { dims, layers, format, kind: ImageKind::D2, usage })
+        };
+        Ok(Self { colour: image("picture's colour", COLOUR)?, depth: image("picture's depth", DEPTH)? })
+    }
+
+    /// Width and height of a view in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        let [width, height, _] = self.colour.desc().dims;
+        [width, height]
+    }
+
+    /// How many views there is room for.
+    pub fn views(&self) -> usize {
+        self.colour.desc().layers as usize
+    }
+}
