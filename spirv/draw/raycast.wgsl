@@ -26,6 +26,8 @@
 struct RaycastParams {
     // pixels of one view
     size: vec2<u32>,
+    // 1: the device filters these texels too coarsely, so values are interpolated here
+    by_hand: u32,
 }
 
 struct Pixel {
@@ -48,8 +50,38 @@ const FLAT_PER_MM = 1e-4;
 // Halvings of a step at a cut: to 1/16 of it.
 const CUT_HALVINGS = 4u;
 
+fn texel_at(x: i32, y: i32, z: i32) -> f32 {
+    return textureLoad(volume, vec3(x, y, z), 0).r;
+}
+
+// What a filter should give.
+fn interpolated(position: vec3<f32>) -> f32 {
+    let last = frame.dims.xyz - 1.0;
+    let at = clamp(position, vec3(0.0), last);
+    let l = vec3<i32>(at);
+    let h = min(l + 1, vec3<i32>(last));
+    let w = at - vec3<f32>(l);
+    let low = mix(
+        mix(texel_at(l.x, l.y, l.z), texel_at(h.x, l.y, l.z), w.x),
+        mix(texel_at(l.x, h.y, l.z), texel_at(h.x, h.y, l.z), w.x),
+        w.y,
+    );
+    let high = mix(
+        mix(texel_at(l.x, l.y, h.z), texel_at(h.x, l.y, h.z), w.x),
+        mix(texel_at(l.x, h.y, h.z), texel_at(h.x, h.y, h.z), w.x),
+        w.y,
+    );
+    return mix(low, high, w.z);
+}
+
 fn value_at(position: vec3<f32>) -> f32 {
-    return textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r * frame.scale + frame.bias;
+    var texel = 0.0;
+    if params.by_hand == 1u {
+        texel = interpolated(position);
+    } else {
+        texel = textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r;
+    }
+    return texel * frame.scale + frame.bias;
 }
 
 fn opacity_at(position: vec3<f32>) -> f32 {

@@ -76,7 +76,7 @@ impl Renderer {
             ambient: method::of(&subject)?,
             brick_distance: BrickDistance::new(gpu, &subject.field)?,
             distances: BrickDistance::buffer(gpu, &subject.field)?,
-            raycast: Raycast::new(gpu)?,
+            raycast: Raycast::new(gpu, &subject.field)?,
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
             presented: Mutex::new(None),

@@ -460,7 +460,8 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 3] = [
+const WITHOUT_TWIN: [(&str, &str); 4] = [
+    ("filter", "asks a device what its filter does; the answer is in the comparison"),
     ("present", "copies texels; the test has what each format makes of them"),
     ("compare", "counts differing bits of two volumes; tests plant differences and count them"),
     ("consistency", "reads what each eye reads; tests compare it with the volume itself"),

@@ -27,6 +27,7 @@ use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
 use cao_model::view::{StereoRig, Tangents, View, with_insets};
 use cao_model::volume::Volume;
 use cao_testing::*;
@@ -449,7 +450,7 @@ impl Stages {
             transfer: TransferBuffer::new(gpu).unwrap(),
             clips: ClipSet::new(gpu).unwrap(),
             frame: FrameBuffer::new(gpu).unwrap(),
-            raycast: Raycast::new(gpu).unwrap(),
+            raycast: Raycast::new(gpu, &field).unwrap(),
             distances: BrickDistance::buffer(gpu, &field).unwrap(),
             field,
         };
@@ -705,5 +706,39 @@ fn a_ray_that_ends_early_changes_no_pixel_by_more_than_half_a_level() {
     }
     assert!(ended > 1000, "only {ended} rays end early");
     assert!(loose > 1.0, "{loose} levels");
+    close(gpu);
+}
+
+/// Masks, few labels, everything that 8 bits hold: the same numbers in bytes and in floats.
+#[test]
+fn pictures_do_not_depend_on_the_type_that_values_are_stored_in() {
+    let gpu = open();
+    let engine = builtin_box("engine", [24, 20, 22], [1.0; 3]).unwrap();
+    let Values::U8(full) = &engine.values else { panic!("the built-in engine has bytes") };
+    let mask = full.iter().map(|v| u8::from(*v > 60)).collect();
+    let labels = full.iter().map(|v| v >> 5).collect();
+    for (name, values) in [("mask", mask), ("labels", labels), ("all", full.clone())] {
+        let bytes = Volume::new(engine.dims, engine.spacing, Values::U8(values)).unwrap();
+        let transfer = TransferFunction::preset("auto", bytes.range()).unwrap();
+        let views = framing(&bytes, 30.0, 25.0);
+        let mut pictures = [in_floats(&bytes), bytes].map(|volume| {
+            let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup(MAPS), COLOUR).unwrap();
+            renderer.update(&mut |_| ()).unwrap();
+            renderer.draw(&views, &Look::default(), SIZE).unwrap().0
+        });
+        for eye in 0..2 {
+            let [floats, bytes] = pictures.each_mut().map(|p| std::mem::take(&mut p.colour[eye]));
+            assert!(
+                floats.iter().filter(|c| c[3] > 0.5).count() > floats.len() / 20,
+                "{name}: nothing shows"
+            );
+            for (f, b) in floats.iter().zip(&bytes) {
+                for i in 0..3 {
+                    let off = (level(f[i], f[3], 0.5) - level(b[i], b[3], 0.5)).abs();
+                    assert!(off <= 1.0, "{name}: {b:?} in bytes, {f:?} in floats");
+                }
+            }
+        }
+    }
     close(gpu);
 }

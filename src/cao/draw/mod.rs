@@ -2,6 +2,7 @@
 
 pub mod brick_distance;
 pub mod eyes;
+pub mod filter;
 pub mod picture;
 pub mod present;
 pub mod raycast;

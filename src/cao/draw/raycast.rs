@@ -7,10 +7,11 @@
 use crate::Result;
 use crate::clip::clips::ClipSet;
 use crate::draw::eyes::FrameBuffer;
+use crate::draw::filter;
 use crate::draw::picture::Picture;
 use crate::field::Field;
 use crate::field::transfer::TransferBuffer;
-use cao_gpu::{Buffer, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use cao_gpu::{Buffer, Format, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
 use cao_kernels::raycast as kernel;
 
 /// What the kernel reads.
@@ -35,14 +36,17 @@ pub struct Bindings<'a> {
 /// The kernel `raycast`.
 pub struct Raycast {
     pipeline: Pipeline,
+    by_hand: u32,
     field: Sampler,
     edge: Sampler,
 }
 
 impl Raycast {
-    /// Builds the pipeline.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
+    /// Builds the pipeline for a volume. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
+        let coarse = field.volume.desc().format == Format::R8Unorm && !filter::keeps_fractions(gpu)?;
         Ok(Self {
+            by_hand: u32::from(coarse),
             pipeline: gpu.compute(&kernel::SHADER, "main")?,
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
@@ -53,7 +57,8 @@ impl Raycast {
     pub fn record(&self, rec: &mut Recorder, bindings: Bindings, picture: &Picture) -> Result<()> {
         let b = bindings;
         let [width, height] = picture.size();
-        let params = kernel::RaycastParams { size: [width, height] };
+        let params =
+            kernel::RaycastParams { size: [width, height], by_hand: self.by_hand, pad: Default::default() };
         let binds = kernel::MainBindings {
             volume: &b.field.volume,
             transfer: &b.transfer.buffer,

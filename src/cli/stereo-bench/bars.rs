@@ -436,7 +436,7 @@ fn picture(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> Result<Row> {
         bar: if judged { Bar::AtMost(4.0) } else { Bar::None },
         unit: "ms",
         found,
-        note: "fragments; the ray caster in compute is to come".into(),
+        note: "the ray cast into storage images; reading back is not counted".into(),
     })
 }
 

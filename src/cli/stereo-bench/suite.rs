@@ -89,7 +89,7 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     let methods: Vec<_> = plan.methods.iter().map(|method| method.name()).collect();
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
-    out.line(format!("views     {views} of {} x {} pixels, in one pass", size[0], size[1]));
+    out.line(format!("views     {views} of {} x {} pixels, in one dispatch", size[0], size[1]));
     out.line(format!("clip      {}", cli.clip));
     out.line(match cli.all_voxels {
         true => "voxels    all",
