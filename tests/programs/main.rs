@@ -3,6 +3,7 @@
 mod bundle;
 mod chart;
 mod cli;
+mod cli_outputs;
 mod cli_refusals;
 mod peers;
 mod stereo_bench;
