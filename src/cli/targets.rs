@@ -4,7 +4,7 @@
 use super::args::usage;
 use anyhow::{Context, Result};
 use cao_formats::{Outputs, input, printable};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_default;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -130,13 +130,21 @@ impl Targets {
     }
 }
 
+/// Signals that end a program, unless it does something about them.
+const ENDING: &[i32] = &[
+    #[cfg(unix)]
+    signal_hook::consts::SIGHUP,
+    SIGINT,
+    SIGTERM,
+];
+
 /// While this lives, signals that would end the program between two files are let pass: all get their names.
 struct Held(Arc<AtomicBool>);
 
 impl Held {
     fn begin() -> Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        for signal in [SIGHUP, SIGINT, SIGTERM] {
+        for &signal in ENDING {
             register_conditional_default(signal, over.clone())?;
         }
         Ok(Self(over))
@@ -158,7 +166,7 @@ mod tests {
     #[test]
     fn signals_that_would_part_files_are_let_pass() {
         let _held = Held::begin().unwrap();
-        for signal in [SIGHUP, SIGINT, SIGTERM] {
+        for &signal in ENDING {
             raise(signal).unwrap();
         }
     }

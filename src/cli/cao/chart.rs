@@ -1,7 +1,7 @@
 //! `cao chart`: time against error of every method, as a report.
 
 use crate::args::{self, Chart as Args, Global, usage};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_formats::{input, printable};
@@ -27,6 +27,10 @@ const QUICK_RADIUS: f32 = 6.0;
 const FILES: [&str; 4] = ["runs.csv", "chart.svg", "chart.png", "report.html"];
 
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
+    // One folder is made; a longer way that is not there is a slip.
+    if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
+        bail!("cannot write {}: there is no folder {}", printable(&args.output), printable(around));
+    }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
     let mut progress = Progress::default();
@@ -83,7 +87,7 @@ fn machine() -> String {
 fn command() -> String {
     let typed = std::env::args_os()
         .skip(1)
-        .map(|word| printable(word))
+        .map(printable)
         .map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
     std::iter::once("cao".to_owned()).chain(typed).collect::<Vec<_>>().join(" ")
 }
