@@ -7,7 +7,6 @@ use cao_formats::{Outputs, input, printable};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::register_conditional_default;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a program is to write.
@@ -138,22 +137,26 @@ const ENDING: &[i32] = &[
     SIGTERM,
 ];
 
+/// Whether they end this program.
+static END: AtomicBool = AtomicBool::new(true);
+
 /// While this lives, signals that would end the program between two files are let pass: all get their names.
-struct Held(Arc<AtomicBool>);
+struct Held;
 
 impl Held {
     fn begin() -> Result<Self> {
-        let over = Arc::new(AtomicBool::new(false));
+        END.store(false, Ordering::SeqCst);
+        let held = Self;
         for &signal in ENDING {
-            register_conditional_default(signal, over.clone())?;
+            register_conditional_default(signal, &END)?;
         }
-        Ok(Self(over))
+        Ok(held)
     }
 }
 
 impl Drop for Held {
     fn drop(&mut self) {
-        self.0.store(true, Ordering::SeqCst);
+        END.store(true, Ordering::SeqCst);
     }
 }
 

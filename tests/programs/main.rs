@@ -8,3 +8,4 @@ mod cli_refusals;
 mod peers;
 mod stereo_bench;
 mod support;
+mod targets;
