@@ -5,9 +5,10 @@ use super::args::usage;
 use anyhow::{Context, Result};
 use cao_formats::{Outputs, input, printable};
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag::register_conditional_default;
+use signal_hook::flag::{register_conditional_default, register_usize};
+use signal_hook::low_level::emulate_default_handler;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// What a program is to write.
 pub struct Targets {
@@ -89,22 +90,23 @@ impl Targets {
         }
     }
 
-    /// Writes all files or, where anything fails, none.
+    /// Writes all files or, where anything fails, none. A signal ends the program when what was begun is gone; once the files get their
+    /// names, all get them.
     ///
     /// # Errors
     /// Those of `fill`; a file that cannot be written, or that is an input by now.
     pub fn write(&self, fill: impl FnOnce(&mut Outputs) -> Result<()>) -> Result<()> {
-        let _held = (!self.folders.is_empty()).then(Held::begin).transpose()?;
+        let held = Held::begin()?;
         let written = self.make_folders().and_then(|()| {
-            let mut outputs = Outputs::default();
+            let mut outputs = Outputs::until(|| CAUGHT.load(Ordering::SeqCst) != 0);
             fill(&mut outputs)?;
-            let _held = Held::begin()?;
             self.spare_inputs()?;
             Ok(outputs.commit()?)
         });
         if written.is_err() {
             // Those that are empty; a failure to tidy up hides no other.
             self.folders.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+            held.obey()?;
         }
         written
     }
@@ -137,20 +139,32 @@ const ENDING: &[i32] = &[
     SIGTERM,
 ];
 
+/// The one that came while they were held.
+static CAUGHT: AtomicUsize = AtomicUsize::new(0);
 /// Whether they end this program.
 static END: AtomicBool = AtomicBool::new(true);
 
-/// While this lives, signals that would end the program between two files are let pass: all get their names.
+/// While this lives, signals that end a program do not: they are remembered.
 struct Held;
 
 impl Held {
     fn begin() -> Result<Self> {
         END.store(false, Ordering::SeqCst);
+        CAUGHT.store(0, Ordering::SeqCst);
         let held = Self;
-        for &signal in ENDING {
+        for signal in heard() {
+            register_usize(signal, &CAUGHT, signal as usize)?;
             register_conditional_default(signal, &END)?;
         }
         Ok(held)
+    }
+
+    /// Ends the program as the signal would have, if there was one.
+    fn obey(self) -> Result<()> {
+        match CAUGHT.load(Ordering::SeqCst) {
+            0 => Ok(()),
+            signal => Ok(emulate_default_handler(signal as i32)?),
+        }
     }
 }
 
@@ -160,6 +174,15 @@ impl Drop for Held {
     }
 }
 
+/// Those that are not to be ignored, as `nohup` and shells ask of what they start.
+fn heard() -> impl Iterator<Item = i32> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    // A bit for each signal, from 1.
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|bits| u64::from_str_radix(bits.trim(), 16).ok()).unwrap_or(0);
+    ENDING.iter().copied().filter(move |signal| ignored >> (signal - 1) & 1 == 0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,10 +190,11 @@ mod tests {
 
     /// Without it the test program dies.
     #[test]
-    fn signals_that_would_part_files_are_let_pass() {
+    fn signals_are_held_and_remembered() {
         let _held = Held::begin().unwrap();
-        for &signal in ENDING {
+        for signal in heard() {
             raise(signal).unwrap();
+            assert_eq!(CAUGHT.load(Ordering::SeqCst), signal as usize);
         }
     }
 }

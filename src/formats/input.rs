@@ -33,9 +33,14 @@ fn identity(path: &Path, _: &Metadata) -> io::Result<Identity> {
 /// The system's.
 pub fn open(path: &Path) -> io::Result<File> {
     let file = File::open(path)?;
-    let identity = identity(path, &file.metadata()?)?;
-    READ.lock().unwrap_or_else(PoisonError::into_inner).insert(identity);
+    remember(path, &file.metadata()?)?;
     Ok(file)
+}
+
+fn remember(path: &Path, meta: &Metadata) -> io::Result<()> {
+    let identity = identity(path, meta)?;
+    READ.lock().unwrap_or_else(PoisonError::into_inner).insert(identity);
+    Ok(())
 }
 
 /// All bytes of a file.

@@ -1,7 +1,8 @@
 //! Output files: all of them whole, or none of them.
 //!
 //! Content goes into files without a name where the system has such (Linux, most file systems): nothing stays behind, however the program
-//! ends. Elsewhere it goes into files with random names, which only a program that is killed leaves. The files' own names come last.
+//! ends. Elsewhere it goes into files with random names, which a program leaves that ends without dropping them. The files' own names come
+//! last.
 
 use std::fs::OpenOptions;
 use std::io::{self, BufWriter, Write};
@@ -12,10 +13,24 @@ use crate::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
 
 /// Files that are written together.
-#[derive(Debug, Default)]
-pub struct Outputs(Vec<(PathBuf, AtomicWriteFile)>);
+#[derive(Debug)]
+pub struct Outputs {
+    files: Vec<(PathBuf, AtomicWriteFile)>,
+    stop: fn() -> bool,
+}
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self::until(|| false)
+    }
+}
 
 impl Outputs {
+    /// Writing fails from the moment that `stop` says so: a program that is to end can drop its files before it does.
+    pub fn until(stop: fn() -> bool) -> Self {
+        Self { files: Vec::new(), stop }
+    }
+
     /// Finds out, by trying and without leaving a trace, whether a file of this name can be written; says where it will be, links followed.
     ///
     /// # Errors
@@ -48,11 +63,11 @@ impl Outputs {
     pub fn write(&mut self, path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let write = || {
             let file = AtomicWriteFile::open(place(path)?)?;
-            let mut out = BufWriter::with_capacity(1 << 16, file);
+            let mut out = BufWriter::with_capacity(1 << 16, Stoppable { file, stop: self.stop });
             fill(&mut out)?;
-            out.into_inner().map_err(|error| error.into_error())
+            Ok(out.into_inner().map_err(|error| error.into_error())?.file)
         };
-        self.0.push((path.into(), write().map_err(Error::io(path))?));
+        self.files.push((path.into(), write().map_err(Error::io(path))?));
         Ok(())
     }
 
@@ -61,14 +76,32 @@ impl Outputs {
     /// # Errors
     /// [`Error::Io`] naming the file.
     pub fn commit(self) -> Result<()> {
-        for (path, file) in &self.0 {
+        for (path, file) in &self.files {
             // Some file systems notice only now that they are full.
             file.sync_all().and_then(|()| place(path)).map_err(Error::io(path))?;
         }
-        for (path, file) in self.0 {
+        for (path, file) in self.files {
             file.commit().map_err(Error::io(&path))?;
         }
         Ok(())
+    }
+}
+
+struct Stoppable {
+    file: AtomicWriteFile,
+    stop: fn() -> bool,
+}
+
+impl Write for Stoppable {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match (self.stop)() {
+            true => Err(io::Error::other("interrupted")),
+            false => self.file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }
 

@@ -728,7 +728,10 @@ const FILES_IN: [(&str, &[&str]); 6] = [
     // An `AtomicWriteFile` too.
     ("File::open(", &["src/formats/input.rs", "src/formats/outputs.rs"]),
     ("fs::read(", &[]),
-    ("fs::read_to_string(", &["src/cli/cao/chart.rs", "src/cli/stereo-bench/machine.rs"]),
+    (
+        "fs::read_to_string(",
+        &["src/cli/cao/chart.rs", "src/cli/stereo-bench/machine.rs", "src/cli/targets.rs"],
+    ),
     ("OpenOptions::new(", &["src/formats/outputs.rs"]),
     ("File::create", &[]),
     ("fs::write(", &[]),

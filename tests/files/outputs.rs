@@ -3,6 +3,7 @@
 use cao_formats::{Outputs, input, printable};
 use std::fs;
 use std::os::unix::fs::symlink;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 #[test]
 fn nothing_has_its_name_before_all_can_have_theirs() {
@@ -28,6 +29,25 @@ fn nothing_has_its_name_before_all_can_have_theirs() {
     for path in [&first, &second] {
         assert_eq!(fs::read(path).unwrap(), b"new");
     }
+}
+
+/// On file systems without unnamed files too: what is dropped is gone.
+#[test]
+fn writing_stops_when_it_is_told_to() {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
+    let mut outputs = Outputs::until(|| STOP.load(Ordering::SeqCst));
+    outputs.write(&first, |file| file.write_all(&[1; 100_000])).unwrap();
+    let stopped = outputs.write(&second, |file| {
+        file.write_all(&[1; 100_000])?;
+        STOP.store(true, Ordering::SeqCst);
+        (0..1000).try_for_each(|_| file.write_all(&[1; 100_000]))
+    });
+    let stopped = stopped.unwrap_err();
+    assert_eq!(std::error::Error::source(&stopped).unwrap().to_string(), "interrupted");
+    drop(outputs);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]
