@@ -15,7 +15,7 @@ const EDGE: usize = 96;
 
 /// Values that compress about as well as a scan: a built-in volume's with two bits of noise.
 fn values() -> Vec<i16> {
-    let engine = cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a built-in volume");
+    let engine = cao_formats::open(format!("builtin:engine:{EDGE}")).expect("a built-in volume");
     let mut random = cao_measure::random::Random::new(1);
     (0..engine.len()).map(|i| 16 * engine.value(i) as i16 + random.below(4) as i16).collect()
 }
@@ -85,7 +85,7 @@ fn readers(criterion: &mut Criterion) {
         b.iter(|| write_nrrd(&target, &like, &ambient, "ambient factor").expect("a written file"));
     });
     group.bench_function("builtin", |b| {
-        b.iter(|| cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a volume"));
+        b.iter(|| cao_formats::open(format!("builtin:engine:{EDGE}")).expect("a volume"));
     });
     group.finish();
 }

@@ -57,7 +57,7 @@ fn sphere(x: f32) -> Clip {
 }
 
 fn stages(criterion: &mut Criterion) {
-    let volume = cao_formats::open(&format!("builtin:engine:{EDGE}")).expect("a volume");
+    let volume = cao_formats::open(format!("builtin:engine:{EDGE}")).expect("a volume");
     let transfer = cao_formats::transfer::load("auto", volume.range()).expect("a preset");
     let gpu = Gpu::open(&OpenOptions::default()).expect("a Vulkan device");
     let mut setup = Setup::of(cao_model::methods::Method::Cao, volume.min_spacing());

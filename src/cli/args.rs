@@ -1,6 +1,7 @@
 //! Flags that the programs share, and what they mean.
 
 use anyhow::{Context, Result};
+use cao_formats::printable;
 use cao_formats::scene::VolumeSource;
 use cao_model::METHODS;
 use cao_model::clip::Shape;
@@ -10,6 +11,7 @@ use cao_model::settings::{Scope, Setup};
 use cao_model::values::Endian;
 use cao_model::volume::Volume;
 use clap::Args;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
 use std::path::Path;
 use std::str::FromStr;
@@ -63,7 +65,7 @@ pub struct Raw {
 pub struct Settings {
     /// Opacity and colour of values: auto, ct-bone, ct-soft, mr, paper, or a TOML file [default: auto]
     #[arg(long, value_name = "FILE|PRESET")]
-    pub transfer: Option<String>,
+    pub transfer: Option<OsString>,
     /// Ray set.
     #[arg(long, value_name = "SET", value_parser = |s: &str| RaySet::parse(s), help = rays_help())]
     pub rays: Option<RaySet>,
@@ -116,7 +118,7 @@ fn by_method(say: impl Fn(&Entry) -> String) -> String {
 
 impl Raw {
     /// What the user means by the name of a volume.
-    pub fn source(&self, input: &str) -> Result<VolumeSource> {
+    pub fn source(&self, input: &OsStr) -> Result<VolumeSource> {
         let source = VolumeSource::parse(input);
         match (self.dims, &self.kind, source) {
             (Some(dims), Some(kind), VolumeSource::File(path)) => Ok(VolumeSource::Raw {
@@ -126,32 +128,37 @@ impl Raw {
                 spacing_mm: self.spacing.unwrap_or([1.0; 3]),
                 big_endian: self.endian == Some(Endian::Big),
             }),
-            (Some(_), ..) => Err(usage(format!("--dims: {input} has dimensions of its own"))),
+            (Some(_), ..) => Err(usage(format!("--dims: {} has dimensions of its own", printable(input)))),
             (None, _, source) => Ok(source),
         }
     }
 
     /// Opens a volume by the name that the user gave.
-    pub fn open(&self, input: &str) -> Result<Volume> {
+    pub fn open(&self, input: &OsStr) -> Result<Volume> {
         open(&self.source(input)?, input)
     }
 }
 
 /// Opens a volume; errors name `input`, also where the library knows of no file.
-pub fn open(source: &VolumeSource, input: &str) -> Result<Volume> {
+pub fn open(source: &VolumeSource, input: &OsStr) -> Result<Volume> {
     match source.open() {
-        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| input.to_owned()),
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input)),
         other => Ok(other?),
     }
 }
 
 /// An analytic shape or a mesh file.
-pub fn shape(name: &str) -> Result<Shape> {
-    if name.to_lowercase().ends_with(".obj") {
+pub fn shape(name: &OsStr) -> Result<Shape> {
+    if has_extension(name, "obj") {
         let mesh = cao_formats::obj::load(Path::new(name))?.outward()?;
         return Ok(Shape::Mesh(Arc::new(mesh)));
     }
-    Shape::parse(name).map_err(|error| usage(error.to_string()))
+    Shape::parse(&name.to_string_lossy()).map_err(|error| usage(error.to_string()))
+}
+
+/// Whether a file's name ends so, in capitals or not.
+pub fn has_extension(name: &OsStr, extension: &str) -> bool {
+    Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
 /// The settings that the flags ask for; the paper's where they say nothing.

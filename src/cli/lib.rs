@@ -1,22 +1,57 @@
-//! What the programs share: flags, what is printed, progress, how they end.
+//! What the programs share: flags, what is printed, what is written, progress, how they end.
 
 #![forbid(unsafe_code)]
 
 pub mod args;
 pub mod output;
+pub mod targets;
 
+use cao_formats::printable;
+use clap::{ArgMatches, Parser};
+use std::io::{ErrorKind, Write, stderr, stdout};
 use std::process::ExitCode;
 
 /// Exit code for a wrong command line, as clap's own.
 const USAGE: u8 = 2;
 
+/// The command line as it was understood and as it was typed; or the exit code, for whom only help was printed or what is wrong.
+pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
+    let matches = C::command().try_get_matches();
+    let parsed = matches.and_then(|matches| Ok((C::from_arg_matches(&matches)?, matches)));
+    parsed.map_err(|answer| {
+        if answer.use_stderr() {
+            // Clap shows words as they were typed.
+            match std::env::args_os().any(|word| printable(&word) != word.to_string_lossy()) {
+                true => complain(&answer.render().to_string()),
+                false => drop(answer.print()),
+            }
+            return ExitCode::from(USAGE);
+        }
+        let printed = answer.print().and_then(|()| stdout().flush());
+        match printed {
+            Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+                let program = C::command().get_name().to_owned();
+                complain(&format!("{program}: cannot write to standard output: {error}"));
+                ExitCode::FAILURE
+            }
+            _ => ExitCode::SUCCESS,
+        }
+    })
+}
+
 /// The exit code of a program; what went wrong is printed once, after the program's name.
 pub fn end(program: &str, outcome: anyhow::Result<ExitCode>) -> ExitCode {
     outcome.unwrap_or_else(|error| {
-        eprintln!("{program}: {error:#}");
+        complain(&format!("{program}: {error:#}"));
         match error.is::<args::Usage>() {
             true => ExitCode::from(USAGE),
             false => ExitCode::FAILURE,
         }
     })
+}
+
+/// Prints to standard error; where that fails there is nobody left to tell.
+fn complain(text: &str) {
+    let lines = text.lines().map(|line| printable(line) + "\n");
+    let _ = stderr().write_all(lines.collect::<String>().as_bytes());
 }

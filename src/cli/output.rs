@@ -1,16 +1,17 @@
 //! What the program prints: text for people, one JSON object for machines, progress on a terminal only.
 
-use super::args::{Global, usage};
-use anyhow::{Context, Result, bail};
+use super::args::Global;
+use anyhow::{Context, Result};
 use cao::ambient::Categories;
+use cao_formats::printable;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
-use std::fs::OpenOptions as FileOptions;
+use std::ffi::OsStr;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -53,14 +54,16 @@ impl Out {
     }
 
     /// A volume's header.
-    pub fn volume(&mut self, name: &str, volume: &Volume) {
+    pub fn volume(&mut self, name: impl AsRef<OsStr>, volume: &Volume) {
         let ([x, y, z], [sx, sy, sz]) = (volume.dims, volume.spacing);
         self.line(format!(
-            "volume    {name}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
+            "volume    {}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
+            printable(&name),
             volume.values.kind()
         ));
         self.json(json!({
-            "volume": name, "dims": volume.dims, "spacing_mm": volume.spacing, "type": volume.values.kind()
+            "volume": name.as_ref().to_string_lossy(), "dims": volume.dims, "spacing_mm": volume.spacing,
+            "type": volume.values.kind()
         }));
     }
 
@@ -118,7 +121,7 @@ impl Out {
 
     /// A file that was written.
     pub fn wrote(&mut self, path: &Path) {
-        self.line(format!("wrote     {}", path.display()));
+        self.line(format!("wrote     {}", printable(path)));
         let files = self.fields.entry("files").or_insert_with(|| json!([]));
         if let Value::Array(files) = files {
             files.push(path.display().to_string().into());
@@ -141,7 +144,8 @@ impl Out {
     /// Standard output cannot be written to.
     pub fn finish(self) -> Result<()> {
         let text = if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
-        match std::io::stdout().write_all(text.as_bytes()) {
+        let mut stdout = std::io::stdout();
+        match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
             Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
             other => other.context("cannot write to standard output"),
         }
@@ -162,52 +166,6 @@ pub fn open_gpu(global: &Global) -> Result<Gpu> {
 /// What it said.
 pub fn check_validation(gpu: &Gpu) -> Result<()> {
     Ok(gpu.assert_clean()?)
-}
-
-/// Refuses files that could not be written in the end, or that would replace an input or one another, before anything
-/// long begins.
-pub fn check_targets<'a>(
-    targets: &[&Path],
-    extension: &str,
-    inputs: impl Iterator<Item = &'a Path>,
-) -> Result<()> {
-    let inputs: Vec<PathBuf> = inputs.filter_map(|input| input.canonicalize().ok()).collect();
-    let mut taken = Vec::new();
-    for target in targets {
-        let shown = target.display();
-        let Some(name) = target.file_name() else {
-            return Err(usage(format!("{shown}: expected the name of a file to write")));
-        };
-        if target.extension().is_some_and(|found| !found.eq_ignore_ascii_case(extension)) {
-            return Err(usage(format!(
-                "{shown}: expected a name that ends in .{extension}, the format written"
-            )));
-        }
-        let folder = match target.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        let Ok(real_folder) = folder.canonicalize() else {
-            bail!("cannot write {shown}: there is no folder {}", folder.display());
-        };
-        if target.is_dir() {
-            bail!("cannot write {shown}: it is a folder, expected the name of a file");
-        }
-        let real = target.canonicalize().unwrap_or_else(|_| real_folder.join(name));
-        if inputs.contains(&real) {
-            return Err(usage(format!("{shown}: would replace an input; expected another name")));
-        }
-        if taken.contains(&real) {
-            return Err(usage(format!("{shown}: would be written twice; expected different names")));
-        }
-        // Permissions, read-only file systems and quotas are found by trying only.
-        let attempt = real_folder.join(format!(".cao-{}.part", std::process::id()));
-        let tried = FileOptions::new().write(true).create_new(true).open(&attempt);
-        tried.with_context(|| format!("cannot write {shown}"))?;
-        std::fs::remove_file(&attempt).with_context(|| format!("cannot write {shown}"))?;
-        taken.push(real);
-    }
-    Ok(())
 }
 
 /// What goes on, on a terminal, where a stage takes longer than a second; nothing in a pipe.

@@ -1,5 +1,6 @@
 //! What can go wrong with a file, said so that the user knows what to do next.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Result with the crate's [`Error`].
@@ -10,7 +11,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused a file.
-    #[error("cannot access {}", path.display())]
+    #[error("cannot access {}", printable(path))]
     Io {
         /// File that was read or written.
         path: PathBuf,
@@ -18,7 +19,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file's content is not what its format or its header says.
-    #[error("{}: {field}: {problem}", path.display())]
+    #[error("{}: {field}: {problem}", printable(path))]
     File {
         /// The file.
         path: PathBuf,
@@ -68,4 +69,16 @@ impl Error {
     pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + Copy + '_ {
         |source| Self::Io { path: path.into(), source }
     }
+}
+
+/// A name as a message shows it: without what would move the cursor of a terminal or begin a line of its own.
+pub fn printable(name: impl AsRef<OsStr>) -> String {
+    let mut text = String::new();
+    for c in name.as_ref().to_string_lossy().chars() {
+        match c.is_control() {
+            true => text.extend(c.escape_default()),
+            false => text.push(c),
+        }
+    }
+    text
 }

@@ -5,10 +5,12 @@
 
 pub mod error;
 mod grid;
+pub mod input;
 mod metaimage;
 mod nifti;
 mod nrrd;
 pub mod obj;
+mod outputs;
 mod payload;
 pub mod picture;
 mod raw;
@@ -19,9 +21,10 @@ pub mod transfer;
 pub mod volume;
 mod write;
 
-pub use error::{Error, Result};
+pub use error::{Error, Result, printable};
+pub use outputs::{Outputs, write_atomic};
 pub use picture::Picture;
 pub use raw::read_raw;
 pub use scene::Scene;
 pub use volume::{open, read};
-pub use write::{write_atomic, write_nrrd};
+pub use write::write_nrrd;

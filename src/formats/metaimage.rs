@@ -6,6 +6,7 @@
 use std::path::Path;
 
 use crate::Result;
+use crate::error::printable;
 use crate::grid::{self, Grid};
 use crate::payload::{Encoding, Part, Payload, Skip};
 use crate::text::{Fields, Lines, data_files, quoted};
@@ -227,7 +228,7 @@ impl<'a> Header<'a> {
         {
             let have = meta.len().saturating_sub(part.start);
             let problem =
-                format!("{size} bytes, but {} holds {have} for {count} values", part.path.display());
+                format!("{size} bytes, but {} holds {have} for {count} values", printable(&part.path));
             return Err(bad(path, "CompressedDataSize", problem));
         }
         Ok(Payload { kind, endian, encoding, skip, parts })

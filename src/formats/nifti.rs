@@ -3,11 +3,11 @@
 //!
 //! Spacing is `pixdim`; origin and directions are those of the sform, else of the qform, both in RAS.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::grid::{self, Grid};
+use crate::input;
 use crate::payload::{Encoding, Part, Payload, Skip};
 use crate::volume::{assemble, bad};
 use crate::{Error, Result};
@@ -62,7 +62,7 @@ fn partner(path: &Path, extension: &str) -> PathBuf {
 /// The first bytes after decompression, and whether there was any.
 fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
     let io = |source| Error::Io { path: path.into(), source };
-    let mut file = File::open(path).map_err(io)?;
+    let mut file = input::open(path).map_err(io)?;
     let mut magic = Vec::new();
     file.by_ref().take(2).read_to_end(&mut magic).map_err(io)?;
     let compressed = magic == GZIP;

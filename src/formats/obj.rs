@@ -1,6 +1,7 @@
 //! Wavefront OBJ: the triangles of clip meshes.
 
-use crate::{Error, Result};
+use crate::error::printable;
+use crate::{Error, Result, input};
 use cao_model::mesh::TriangleMesh;
 use glam::Vec3;
 use std::io::Cursor;
@@ -13,8 +14,8 @@ use std::path::Path;
 /// [`Error::Io`] when the file cannot be read, [`cao_model::Error::Mesh`] naming the file (and the line where there is one)
 /// when it is not an OBJ file, has no faces, or has coordinates that are not finite.
 pub fn load(path: &Path) -> Result<TriangleMesh> {
-    let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let name = printable(path);
+    let bytes = input::read(path).map_err(Error::io(path))?;
     parse(name, &String::from_utf8_lossy(&bytes))
 }
 

@@ -8,6 +8,8 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use crate::error::printable;
+use crate::input;
 use crate::volume::bad;
 use crate::{Error, Result};
 use cao_model::values::{Endian, Kind, Values};
@@ -94,12 +96,12 @@ struct OpenPart<'a> {
 
 impl<'a> OpenPart<'a> {
     fn open(part: &'a Part, header: &Path, field: &str) -> Result<Self> {
-        let missing = |why: String| bad(header, field, format!("data file {}: {why}", part.path.display()));
+        let missing = |why: String| bad(header, field, format!("data file {}: {why}", printable(&part.path)));
         let meta = std::fs::metadata(&part.path).map_err(|e| missing(e.to_string()))?;
         if !meta.is_file() {
             return Err(missing("not a regular file".into()));
         }
-        let mut file = File::open(&part.path).map_err(|e| missing(e.to_string()))?;
+        let mut file = input::open(&part.path).map_err(|e| missing(e.to_string()))?;
         file.seek(SeekFrom::Start(part.start)).map_err(|e| missing(e.to_string()))?;
         let file = BufReader::with_capacity(1 << 16, file);
         Ok(Self { path: &part.path, start: part.start, length: meta.len(), file })

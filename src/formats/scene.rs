@@ -65,8 +65,9 @@ use glam::Vec3;
 use serde::Deserialize;
 use toml::Value;
 
+use crate::error::printable;
 use crate::toml_value::{in_line, number, parse_colour, shown};
-use crate::{Error, Result, obj, transfer};
+use crate::{Error, Result, input, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
@@ -121,8 +122,12 @@ pub enum VolumeSource {
 
 impl VolumeSource {
     /// What the user calls a volume on the command line: `builtin:NAME:SIZE` or a path.
-    pub fn parse(spec: &str) -> Self {
-        if spec.starts_with("builtin:") { Self::Builtin(spec.into()) } else { Self::File(spec.into()) }
+    pub fn parse(spec: impl AsRef<Path>) -> Self {
+        let path = spec.as_ref();
+        match path.to_str().filter(|name| name.starts_with("builtin:")) {
+            Some(name) => Self::Builtin(name.into()),
+            None => Self::File(path.into()),
+        }
     }
 }
 
@@ -297,7 +302,7 @@ impl Scene {
     /// errors of [`obj::load`], [`TriangleMesh::outward`](cao_model::mesh::TriangleMesh::outward) and [`transfer::load`] for files it
     /// names.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        let text = input::read_to_string(path).map_err(Error::io(path))?;
         Self::from_toml(&text, path.parent().unwrap_or(Path::new("."))).map_err(|error| error.in_file(path))
     }
 
@@ -719,7 +724,7 @@ fn existing(key: &str, base: &Path, path: &Path) -> Result<PathBuf> {
     let path = base.join(path);
     match path.exists() {
         true => Ok(path),
-        false => Err(Error::refused(key, format!("there is no file {}", path.display()))),
+        false => Err(Error::refused(key, format!("there is no file {}", printable(path)))),
     }
 }
 

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
+use crate::input;
 use crate::payload::Part;
 use crate::volume::bad;
 use crate::{Error, Result};
@@ -24,7 +25,7 @@ pub(crate) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     pub(crate) fn open(path: &'a Path) -> Result<Self> {
-        let file = File::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        let file = input::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
         Ok(Self { path, file: BufReader::new(file).take(MAX_HEADER_BYTES), position: 0 })
     }
 

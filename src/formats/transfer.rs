@@ -17,7 +17,7 @@
 //! ```
 
 use crate::toml_value::{in_line, number, parse_colour, shown};
-use crate::{Error, Result};
+use crate::{Error, Result, input};
 use cao_model::transfer::{TransferFunction, coloured, preset_names, to_srgb};
 use serde::Deserialize;
 use std::fmt::Write as _;
@@ -83,13 +83,13 @@ pub fn from_table(table: toml::Table) -> Result<TransferFunction> {
 /// # Errors
 /// [`Error::Model`] when it is neither; [`Error::File`] naming file and key when the file is wrong;
 /// [`Error::Io`] when it cannot be read.
-pub fn load(spec: &str, range: (f64, f64)) -> Result<TransferFunction> {
-    if TransferFunction::is_preset(spec) {
-        return Ok(TransferFunction::preset(spec, range)?);
+pub fn load(spec: impl AsRef<Path>, range: (f64, f64)) -> Result<TransferFunction> {
+    let path = spec.as_ref();
+    if let Some(name) = path.to_str().filter(|name| TransferFunction::is_preset(name)) {
+        return Ok(TransferFunction::preset(name, range)?);
     }
-    let path = Path::new(spec);
     if !path.exists() {
-        let problem = format!("{spec:?} is neither a file nor a preset ({})", preset_names());
+        let problem = format!("{path:?} is neither a file nor a preset ({})", preset_names());
         return Err(Error::refused("transfer", problem));
     }
     read(path)
@@ -100,7 +100,7 @@ pub fn load(spec: &str, range: (f64, f64)) -> Result<TransferFunction> {
 /// # Errors
 /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file and key when it is wrong.
 pub fn read(path: &Path) -> Result<TransferFunction> {
-    let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+    let text = input::read_to_string(path).map_err(Error::io(path))?;
     from_toml(&text).map_err(|error| error.in_file(path))
 }
 

@@ -7,13 +7,12 @@
 //! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header
 //! exactly (too short, too long, NaN, an unknown type) is refused with the file and the field named.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use crate::grid::Grid;
 use crate::scene::VolumeSource;
-use crate::{Error, Result, metaimage, nifti, nrrd, read_raw};
+use crate::{Error, Result, input, metaimage, nifti, nrrd, read_raw};
 use cao_model::builtin;
 use cao_model::values::{Endian, Values};
 use cao_model::volume::{Volume, check_finite};
@@ -21,7 +20,7 @@ use cao_model::volume::{Volume, check_finite};
 /// A volume by the name a user gives: a file ([`read`]), or `builtin:NAME:SIZE` ([`builtin::from_spec`]).
 ///
 /// Errors: those of [`read`] and [`builtin::from_spec`].
-pub fn open(spec: &str) -> Result<Volume> {
+pub fn open(spec: impl AsRef<Path>) -> Result<Volume> {
     VolumeSource::parse(spec).open()
 }
 
@@ -48,7 +47,7 @@ impl VolumeSource {
 pub fn read(path: &Path) -> Result<Volume> {
     let io = |source| Error::Io { path: path.into(), source };
     let mut head = Vec::new();
-    File::open(path).map_err(io)?.take(HEAD_BYTES).read_to_end(&mut head).map_err(io)?;
+    input::open(path).map_err(io)?.take(HEAD_BYTES).read_to_end(&mut head).map_err(io)?;
     if nrrd::is_nrrd(&head) {
         return nrrd::read(path);
     }

@@ -50,7 +50,7 @@ const CRATES: &[Crate] = &[
         "src/formats",
         "cao-formats",
         &["cao-model"],
-        &["flate2", "glam", "image", "serde", "thiserror", "tobj", "toml"],
+        &["atomic-write-file", "flate2", "glam", "image", "serde", "thiserror", "tobj", "toml"],
     ),
     // The truth: it must not share code with what it judges, but sizes and codes are said once, in the kernels.
     uses("src/twin", "cao-twin", &["cao-kernels", "cao-model"], &["glam"]),
@@ -64,7 +64,7 @@ const CRATES: &[Crate] = &[
         "src/cli",
         "cao-cli",
         &["cao", "cao-formats", "cao-gpu", "cao-measure", "cao-model", "cao-twin"],
-        &["anyhow", "clap", "glam", "indicatif", "serde_json", "thiserror"],
+        &["anyhow", "clap", "glam", "indicatif", "serde_json", "signal-hook", "thiserror"],
     ),
     // For tests and benches.
     uses(
@@ -194,20 +194,22 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/builtin.rs", &["error", "values", "volume"]),
     ("src/formats/error.rs", &[]),
     ("src/formats/grid.rs", &[]),
+    ("src/formats/input.rs", &[]),
+    ("src/formats/outputs.rs", &["error"]),
     ("src/formats/toml_value.rs", &["error"]),
-    ("src/formats/write.rs", &["error"]),
-    ("src/formats/picture.rs", &["error", "write"]),
-    ("src/formats/obj.rs", &["error"]),
-    ("src/formats/transfer.rs", &["error", "toml_value"]),
-    ("src/formats/scene.rs", &["error", "obj", "toml_value", "transfer"]),
+    ("src/formats/write.rs", &["error", "outputs"]),
+    ("src/formats/picture.rs", &["error", "outputs"]),
+    ("src/formats/obj.rs", &["error", "input"]),
+    ("src/formats/transfer.rs", &["error", "input", "toml_value"]),
+    ("src/formats/scene.rs", &["error", "input", "obj", "toml_value", "transfer"]),
     // The readers of volumes, and what refuses and assembles for all of them.
-    ("src/formats/payload.rs", &["error", "volume"]),
-    ("src/formats/text.rs", &["error", "payload", "volume"]),
+    ("src/formats/payload.rs", &["error", "input", "volume"]),
+    ("src/formats/text.rs", &["error", "input", "payload", "volume"]),
     ("src/formats/raw.rs", &["error", "grid", "payload", "volume"]),
     ("src/formats/nrrd.rs", &["error", "grid", "payload", "text", "volume"]),
-    ("src/formats/nifti.rs", &["error", "grid", "payload", "volume"]),
+    ("src/formats/nifti.rs", &["error", "grid", "input", "payload", "volume"]),
     ("src/formats/metaimage.rs", &["error", "grid", "payload", "text", "volume"]),
-    ("src/formats/volume.rs", &["error", "grid", "metaimage", "nifti", "nrrd", "raw", "scene"]),
+    ("src/formats/volume.rs", &["error", "grid", "input", "metaimage", "nifti", "nrrd", "raw", "scene"]),
     // Kernels' host sides, room by room, and the renderer above them.
     ("src/cao/error.rs", &[]),
     ("src/cao/stages.rs", &[]),
@@ -268,7 +270,7 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
     ("src/measure/", "Error", "failure"),
     ("src/measure/", "Result", "failure"),
     ("src/formats/", "read_raw", "raw"),
-    ("src/formats/", "write_atomic", "write"),
+    ("src/formats/", "write_atomic", "outputs"),
     ("src/formats/", "write_nrrd", "write"),
 ];
 
@@ -720,6 +722,39 @@ fn libraries_print_nothing_and_leave_nothing_to_do() {
     assert_eq!(noises("src/cli/cao/main.rs", "println!(\"ok\");"), [""; 0]);
     assert_eq!(noises("src/cli/cao/main.rs", "dbg!(x);"), ["src/cli/cao/main.rs: dbg!"]);
     assert_eq!(noises("spirv/build.rs", "println!(\"cargo::error=x\"); todo!()"), ["spirv/build.rs: todo!"]);
+}
+
+/// How a file is opened, and where in what has to do with files: what is read is remembered in one place and so never written over, what
+/// is written is whole or not there. The system's own files are nobody's.
+const FILES_IN: [(&str, &[&str]); 6] = [
+    // An `AtomicWriteFile` too.
+    ("File::open(", &["src/formats/input.rs", "src/formats/outputs.rs"]),
+    ("fs::read(", &[]),
+    (
+        "fs::read_to_string(",
+        &["src/cli/cao/chart.rs", "src/cli/stereo-bench/machine.rs", "src/cli/targets.rs"],
+    ),
+    ("OpenOptions::new(", &["src/formats/outputs.rs"]),
+    ("File::create", &[]),
+    ("fs::write(", &[]),
+];
+
+fn past_the_door(file: &str, text: &str) -> Vec<String> {
+    let code = code(text);
+    let found = FILES_IN.iter().filter(|(call, places)| code.contains(call) && !places.contains(&file));
+    found.map(|(call, _)| format!("{file}: {call}")).collect()
+}
+
+#[test]
+fn files_are_opened_in_one_place() {
+    let files = sources(&["src/formats", "src/measure", "src/cli"]);
+    let wrong: Vec<String> = files.iter().flat_map(|(file, text)| past_the_door(file, text)).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    for (call, places) in FILES_IN {
+        assert!(places.iter().all(|place| files[*place].contains(call)), "{call}");
+        let planted = format!("let file = std::{call}path)?;");
+        assert_eq!(past_the_door("src/formats/raw.rs", &planted), [format!("src/formats/raw.rs: {call}")]);
+    }
 }
 
 // ------------------------------------------------------------------------------------------------------- documentation

@@ -98,7 +98,7 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
 
 /// A built-in volume with soft and hard parts, as opacity.
 fn fruit(size: usize) -> (Grid, Vec<f32>) {
-    let volume = cao_formats::open(&format!("builtin:fruit:{size}")).unwrap();
+    let volume = cao_formats::open(format!("builtin:fruit:{size}")).unwrap();
     let transfer = cao_model::transfer::TransferFunction::preset("auto", volume.range()).unwrap();
     let opacity = (0..volume.len()).map(|i| transfer.opacity_at(volume.value(i) as f32)).collect();
     (grid_of(&volume), opacity)

@@ -234,7 +234,7 @@ fn drawings_are_well_formed_and_show_every_method_and_change(chart: &Chart) {
     assert!(well_formed(&svg.replacen("x=\"", "x=", 1)).is_err());
 }
 
-const PEERS: &str = r#"{"machine": "a <machine>", "volume": "v", "dims": [1, 2, 3], "image_size": [4, 5], "radius_mm": 6, "rounds": 7,
+pub const PEERS: &str = r#"{"machine": "a <machine>", "volume": "v", "dims": [1, 2, 3], "image_size": [4, 5], "radius_mm": 6, "rounds": 7,
     "rows": [{"system": "VTK", "what": "plain & simple", "median_ms": 8, "low": 7, "high": 9, "ratio_to_cao": 1.25}],
     "stereo": {"rows": [{"what": "SSAO", "points": 10, "mean": 0.02, "p99": 0.1}]},
     "clip_shadow": {"rows": [{"what": "floor", "mean_brightness": 130.2, "too_dark": 11, "floor_pixels": 12}]}, "notes": ["a note"]}"#;
@@ -290,7 +290,11 @@ occlusion = { radius_mm = 3 }
 fn the_program_writes_all_files_and_says_which() {
     let folder = Folder::with_device();
     folder.put("peers.json", PEERS).put("scene.toml", SCENE);
-    let answer = folder.json("chart scene.toml --quick --runs 1 --peers peers.json -o chart");
+    // A name that is not UTF-8 is a name, and part of the command that the report cites.
+    let script = r#"name=$(printf 'caf\351.json'); mv peers.json "$name"; exec "$@" --peers "$name""#;
+    let run = folder.under(script, "chart scene.toml --quick --runs 1 -o chart --json");
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    let answer: serde_json::Value = serde_json::from_str(&run.out).unwrap();
     assert_eq!(answer["files"].as_array().unwrap().len(), 4);
     let mut names: Vec<_> = std::fs::read_dir(folder.path("chart"))
         .unwrap()
@@ -305,7 +309,7 @@ fn the_program_writes_all_files_and_says_which() {
     let report = std::fs::read_to_string(folder.path("chart/report.html")).unwrap();
     // What the scene says, and not what is done where it says nothing.
     assert!(report.contains("scene.toml: 16 x 14 x 12 voxels, radius 3 mm, clip plane"));
-    assert!(report.contains("plain &amp; simple"));
+    assert!(report.contains("plain &amp; simple") && report.contains("--peers caf\u{fffd}.json"));
     assert_eq!(references(&report), [""; 0]);
 }
 

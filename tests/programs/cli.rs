@@ -1,5 +1,5 @@
 //! The real program on the real device, under validation, in folders of its own: every command and what it writes and prints.
-//! What it refuses is in `cli_refusals.rs`.
+//! What it refuses is in `cli_refusals.rs`, how it writes in `cli_outputs.rs`.
 
 use crate::support::{Folder, cube_obj, nrrd};
 use cao_formats::read;

@@ -1,6 +1,7 @@
 //! What the program refuses: with which exit code, in which words, and leaving nothing behind. No device is needed, which
 //! shows that refusals come before any long work.
 
+use crate::chart::PEERS;
 use crate::support::{Folder, cube_obj, nrrd};
 use std::io::Write;
 
@@ -318,6 +319,146 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
         ("-o s.jpg", USAGE, &["s.jpg", ".png"]),
     ] {
         refused(&folder, &format!("render in.nrrd {flags}"), code, parts);
+    }
+}
+
+#[test]
+fn names_that_no_file_can_have_are_refused_before_the_work() {
+    let folder = Folder::without_device();
+    std::os::unix::fs::symlink("nothing", folder.path("nowhere")).unwrap();
+    let made = std::process::Command::new("mkfifo").arg(folder.path("pipe")).status().unwrap();
+    assert!(made.success());
+    let long = "x".repeat(300);
+    // Its own name is one that a file can have, the one that it has until it is whole is not.
+    let longest = "x".repeat(255);
+    for (name, parts) in [
+        (long.as_str(), &["too long"][..]),
+        (longest.as_str(), &["too long"]),
+        ("pipe", &["pipe: is a device, a pipe or a socket"]),
+        ("/dev/null", &["/dev/null: is a device"]),
+        ("nowhere", &["nowhere: is a link to a file that is not there"]),
+        (".", &[]),
+    ] {
+        let code = if parts.is_empty() { USAGE } else { FAILURE };
+        refused(&folder, &format!("occlusion builtin:engine:8 -o {name}"), code, parts);
+        refused(&folder, &format!("occlusion builtin:engine:8 -o ao.nrrd --mask-out {name}"), code, parts);
+        refused(&folder, &format!("render builtin:engine:8 --eyes l.png,{name}"), code, parts);
+    }
+    for command in ["chart builtin:engine:8", "stability"] {
+        refused(&folder, &format!("{command} -o {long}"), FAILURE, &["too long"]);
+    }
+    for eyes in ["a,b,c", "a.png", "1,2,3,4", "a,", ",b", ","] {
+        refused(
+            &folder,
+            &format!("render builtin:engine:8 -o s.png --eyes {eyes}"),
+            USAGE,
+            &["--eyes", "LEFT,RIGHT"],
+        );
+    }
+}
+
+/// A file that is read on the way, and an argument that makes the program read it.
+const READ: [(&str, &str); 17] = [
+    ("vox.nrrd", "a.nhdr"),
+    ("vox.nrrd", "./././a.nhdr"),
+    ("p1.nrrd", "list.nhdr"),
+    ("p2.nrrd", "list.nhdr"),
+    ("p1.nrrd", "pattern.nhdr"),
+    ("p2.nrrd", "pattern.nhdr"),
+    ("vox.nrrd", "a.mhd"),
+    ("p2.nrrd", "list.mhd"),
+    ("a.nhdr", "a.nhdr"),
+    ("a.mhd", "a.mhd"),
+    ("pair.hdr", "pair.hdr"),
+    ("pair.img", "pair.hdr"),
+    ("pair.hdr", "pair.img"),
+    ("pair.img", "pair.img"),
+    ("vox.nrrd", "vox.nrrd --dims 4,4,4 --type uint8"),
+    ("cube.obj", "builtin:engine:8 --clip cube.obj"),
+    ("tf.toml", "builtin:engine:8 --transfer tf.toml"),
+];
+
+/// The same of scenes.
+const READ_BY_SCENE: [(&str, &str); 6] = [
+    ("scene.toml", "scene.toml"),
+    ("a.nhdr", "scene.toml"),
+    ("vox.nrrd", "scene.toml"),
+    ("cube.obj", "scene.toml"),
+    ("tf.toml", "scene.toml"),
+    ("vox.nrrd", "raw.toml"),
+];
+
+#[test]
+fn no_file_that_was_read_is_replaced_whatever_its_name() {
+    let folder = Folder::without_device();
+    let header = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 4 4 4\nspacings: 1 1 1\nencoding: raw\n";
+    let meta = "ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementType = MET_UCHAR\n";
+    let mut pair = nifti(2, 8, &[]);
+    pair[344..348].copy_from_slice(b"ni1\0");
+    pair[108..112].copy_from_slice(&0f32.to_le_bytes());
+    folder.put("vox.nrrd", [7; 64]).put("p1.nrrd", [7; 32]).put("p2.nrrd", [7; 32]).put("pair.img", [7; 64]);
+    folder.put("pair.hdr", &pair[..348]).put("cube.obj", cube_obj(6));
+    folder.put("a.nhdr", format!("{header}data file: vox.nrrd\n"));
+    folder.put("list.nhdr", format!("{header}data file: LIST 3\np1.nrrd\np2.nrrd\n"));
+    folder.put("pattern.nhdr", format!("{header}data file: p%d.nrrd 1 2 1 3\n"));
+    folder.put("a.mhd", format!("{meta}ElementDataFile = vox.nrrd\n"));
+    folder.put("list.mhd", format!("{meta}ElementDataFile = LIST 3D\np1.nrrd\np2.nrrd\n"));
+    folder.put("tf.toml", "opacity = [[0, 0.0], [255, 0.5]]\ncolour = \"#ffffff\"\n");
+    let clip = "[[clip]]\nmesh = \"cube.obj\"\n";
+    folder.put("scene.toml", format!("volume = \"a.nhdr\"\ntransfer = \"tf.toml\"\n{clip}"));
+    folder.put("raw.toml", "volume = { raw = \"vox.nrrd\", dims = [4, 4, 4], type = \"uint8\" }\n");
+    std::fs::create_dir(folder.path("links")).unwrap();
+
+    // Another name of the same file, or a link to it, whose own name would do.
+    let alias = |name: &str, ending: &str, n: usize| {
+        let (hard, soft) = (format!("links/hard{n}.{ending}"), format!("links/soft{n}.{ending}"));
+        std::fs::hard_link(folder.path(name), folder.path(&hard)).unwrap();
+        std::os::unix::fs::symlink(folder.path(name), folder.path(&soft)).unwrap();
+        [hard, soft]
+    };
+    let spared = |name: &str, line: &str, target: &str| {
+        let content = std::fs::read(folder.path(name)).unwrap();
+        refused(&folder, line, USAGE, &[target, "would replace an input"]);
+        assert_eq!(std::fs::read(folder.path(name)).unwrap(), content, "{line}");
+    };
+    for (n, (name, reads)) in READ.into_iter().enumerate() {
+        for target in alias(name, "nrrd", n) {
+            spared(name, &format!("occlusion {reads} -o {target}"), &target);
+            spared(name, &format!("occlusion {reads} -o ao.nrrd --mask-out {target}"), &target);
+        }
+        if name.ends_with(".nrrd") {
+            spared(name, &format!("occlusion {reads} --opacity-out {name} -o ao.nrrd"), name);
+        }
+    }
+    let scenes = READ.into_iter().chain(READ_BY_SCENE).enumerate();
+    for (n, (name, reads)) in scenes {
+        for target in alias(name, "png", n) {
+            spared(name, &format!("render {reads} -o {target}"), &target);
+            spared(name, &format!("render {reads} --eyes l.png,{target}"), &target);
+        }
+    }
+    for (n, (name, reads)) in READ_BY_SCENE.into_iter().enumerate() {
+        for file in ["runs.csv", "chart.svg", "chart.png", "report.html"] {
+            let chart = format!("chart{n}-{file}");
+            std::fs::create_dir(folder.path(&chart)).unwrap();
+            std::fs::hard_link(folder.path(name), folder.path(&format!("{chart}/{file}"))).unwrap();
+            spared(name, &format!("chart {reads} -o {chart}"), file);
+        }
+    }
+    folder.put("peers.json", PEERS);
+    std::fs::create_dir(folder.path("chart")).unwrap();
+    std::fs::hard_link(folder.path("peers.json"), folder.path("chart/chart.svg")).unwrap();
+    spared("peers.json", "chart builtin:engine:8 --peers peers.json -o chart", "chart.svg");
+    let bench = Folder::without_device().running(env!("CARGO_BIN_EXE_stereo-bench"));
+    for (n, (name, reads)) in READ.into_iter().enumerate() {
+        let [target, _] = alias(name, "csv", n);
+        let words: Vec<_> = reads.split_whitespace().chain(["--csv", &target]).collect();
+        let output = bench.command(&words).current_dir(folder.path("")).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.code() == Some(USAGE) && said.contains("would replace an input"),
+            "{reads}: {said}"
+        );
     }
 }
 

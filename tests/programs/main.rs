@@ -3,7 +3,9 @@
 mod bundle;
 mod chart;
 mod cli;
+mod cli_outputs;
 mod cli_refusals;
 mod peers;
 mod stereo_bench;
 mod support;
+mod targets;

@@ -1,5 +1,6 @@
 //! Running the real program in a folder of its own.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
@@ -66,16 +67,34 @@ impl Folder {
     }
 
     /// The program with these arguments, not yet started.
-    pub fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(self.program);
-        command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
+    pub fn command<S: AsRef<OsStr>>(&self, arguments: &[S]) -> Command {
+        let mut command = self.here(self.program);
+        command.args(arguments);
+        command
+    }
+
+    fn here(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(self.folder.path()).stdin(Stdio::null());
         command.envs(self.environment.iter().copied());
         command
     }
 
     /// Runs the program; arguments are separated by white space.
     pub fn run(&self, arguments: &str) -> Run {
-        let output = self.command(&arguments.split_whitespace().collect::<Vec<_>>()).output().unwrap();
+        self.under("exec \"$@\"", arguments)
+    }
+
+    /// The program run by a shell script, for which it is, with its arguments, `"$@"`.
+    pub fn shell(&self, script: &str, arguments: &str) -> Command {
+        let mut shell = self.here("sh");
+        shell.args(["-c", script, "sh", self.program]).args(arguments.split_whitespace());
+        shell
+    }
+
+    /// Runs such a script.
+    pub fn under(&self, script: &str, arguments: &str) -> Run {
+        let output = self.shell(script, arguments).output().unwrap();
         let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
         let run = Run {
             line: format!("{} {arguments}", self.program),

@@ -1,15 +1,17 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in [`cao_cli::args`].
 
 use anyhow::{Context, Result};
-pub use cao_cli::args::{Global, Raw, Settings, open, setup, shape, usage};
+pub use cao_cli::args::{Global, Raw, Settings, has_extension, open, setup, shape, usage};
 use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
+use cao_formats::printable;
 use cao_measure::stability::Trial;
 use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
-use clap::{ArgMatches, Args, Parser, Subcommand};
+use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Volumes with ambient occlusion, for both eyes, exact under clipping.
@@ -119,7 +121,7 @@ is there to catch does not.";
 pub struct Clips {
     /// Clip with plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; up to 8 times
     #[arg(long, value_name = "SHAPE|MESH.obj")]
-    pub clip: Vec<String>,
+    pub clip: Vec<OsString>,
     /// What disappears. remove: the inside; keep: the outside [default: remove]
     #[arg(long, value_name = "remove|keep", value_parser = |s: &str| Mode::parse(s))]
     pub clip_mode: Vec<Mode>,
@@ -157,13 +159,13 @@ fn budget(text: &str) -> Result<f64, String> {
 #[derive(Args)]
 pub struct Render {
     /// Scene file (.toml), volume file, or builtin:NAME:SIZE
-    pub input: String,
+    pub input: OsString,
     /// Picture of both eyes side by side (PNG)
     #[arg(short, long, value_name = "FILE", required_unless_present = "eyes")]
     pub output: Option<PathBuf>,
     /// One picture for each eye (PNG); instead of -o or beside it
-    #[arg(long, value_name = "LEFT,RIGHT", value_parser = pair)]
-    pub eyes: Option<[PathBuf; 2]>,
+    #[arg(long, value_name = "LEFT,RIGHT", value_delimiter = ',', action = ArgAction::Set)]
+    pub eyes: Vec<PathBuf>,
     /// Pixels of one eye [default: 1024x1024]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
@@ -198,7 +200,7 @@ pub struct Render {
 #[derive(Args)]
 pub struct Occlusion {
     /// Volume file or builtin:NAME:SIZE
-    pub input: String,
+    pub input: OsString,
     /// Ambient volume (NRRD of f32, x fastest, the input's spacing)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -228,7 +230,7 @@ pub struct Occlusion {
 pub struct Verify {
     /// Volume file, builtin:NAME:SIZE, or built-in for all built-in scenes
     #[arg(default_value = "built-in")]
-    pub input: String,
+    pub input: OsString,
     /// Random poses of every shape
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub poses: u32,
@@ -237,7 +239,7 @@ pub struct Verify {
     pub seed: u64,
     /// Shapes to clip with, meshes too [default: plane,box,sphere,cylinder,cone,torus]
     #[arg(long, value_name = "SHAPE,...", value_delimiter = ',')]
-    pub shapes: Vec<String>,
+    pub shapes: Vec<OsString>,
     /// Compare every voxel, not only those that a sample with opacity can touch
     #[arg(long)]
     pub all_voxels: bool,
@@ -295,7 +297,7 @@ fn default_method() -> String {
 #[derive(Args)]
 pub struct Chart {
     /// Scene files (.toml), volume files, or builtin:NAME:SIZE [default: engine, fruit, skeleton]
-    pub scenes: Vec<String>,
+    pub scenes: Vec<OsString>,
     /// Folder for report, chart and numbers; made where there is none
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
@@ -310,7 +312,7 @@ pub struct Chart {
     pub runs: u32,
     /// Opacity and colour of values, as in `cao render` [default: the scene's, auto for volumes]
     #[arg(long, value_name = "FILE|PRESET")]
-    pub transfer: Option<String>,
+    pub transfer: Option<OsString>,
     /// Length of the rays in mm [default: the scene's; 8 voxels for the default scenes, else 20]
     #[arg(long, value_name = "R", value_parser = positive, allow_hyphen_values = true)]
     pub radius_mm: Option<f32>,
@@ -337,7 +339,7 @@ pub struct Stability {
 #[derive(Args)]
 pub struct Info {
     /// Volume file or builtin:NAME:SIZE
-    pub input: String,
+    pub input: OsString,
     #[command(flatten)]
     pub raw: Raw,
 }
@@ -371,8 +373,8 @@ pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
     let scales = owners("clip_scale")?;
 
     let mut clips = Vec::new();
-    for name in values::<String>(matches, "clip") {
-        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {name}"))?));
+    for name in values::<OsString>(matches, "clip") {
+        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {}", printable(&name)))?));
     }
     for (clip, mode) in modes.into_iter().zip(values(matches, "clip_mode")) {
         clips[clip].mode = mode;
@@ -428,11 +430,4 @@ fn angle(text: &str) -> Result<f32, String> {
 
 fn elevation(text: &str) -> Result<f32, String> {
     number(text, "an angle from -90 to 90 degrees", |degrees| degrees.abs() <= 90.0)
-}
-
-fn pair(text: &str) -> Result<[PathBuf; 2], String> {
-    match text.split_once(',') {
-        Some((left, right)) if !left.is_empty() && !right.is_empty() => Ok([left.into(), right.into()]),
-        _ => Err("expected two files, LEFT,RIGHT".into()),
-    }
 }

@@ -1,15 +1,17 @@
 //! `cao chart`: time against error of every method, as a report.
 
 use crate::args::{self, Chart as Args, Global, usage};
-use anyhow::{Context, Result};
-use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
-use cao_formats::write_atomic;
+use anyhow::{Context, Result, bail};
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_cli::targets::Targets;
+use cao_formats::{input, printable};
 use cao_measure::chart;
 use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{Chart, Plan, Scene, csv, draw, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
 use serde_json::json;
+use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -21,12 +23,20 @@ const DEFAULT_RADIUS: f32 = 8.0;
 const QUICK: [&str; 3] = ["builtin:engine:32", "builtin:fruit:32", "builtin:skeleton:32"];
 const QUICK_RADIUS: f32 = 6.0;
 
+/// What is written.
+const FILES: [&str; 4] = ["runs.csv", "chart.svg", "chart.png", "report.html"];
+
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
-    let folder = Folder::prepare(args)?;
+    // One folder is made; a longer way that is not there is a slip.
+    if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
+        bail!("cannot write {}: there is no folder {}", printable(&args.output), printable(around));
+    }
+    let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
     let mut progress = Progress::default();
     progress.stage("reading");
     let scenes = scenes(args)?;
+    targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let plan = plan(args);
@@ -40,28 +50,28 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let caption = chart.caption();
     let every: Vec<_> = chart.scenes.iter().collect();
     let drawing = draw::draw(&chart, &every, &caption);
-    let files = [
-        ("runs.csv", csv::runs(&chart).into_bytes()),
-        ("chart.svg", drawing.svg().into_bytes()),
-        ("chart.png", drawing.png()?),
-        ("report.html", report::html(&chart, &machine(), &command(), peers.as_ref())?.into_bytes()),
+    let contents = [
+        csv::runs(&chart).into_bytes(),
+        drawing.svg().into_bytes(),
+        drawing.png()?,
+        report::html(&chart, &machine(), &command(), peers.as_ref())?.into_bytes(),
     ];
-    folder.write(&files)?;
+    targets.write_all(&contents)?;
     drop(progress);
 
     let mut out = Out::new(global);
     out.device(&gpu);
     summary(&mut out, &chart);
-    for (name, _) in &files {
-        out.wrote(&args.output.join(name));
+    for path in targets.paths() {
+        out.wrote(path);
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn read_peers(path: &Path) -> Result<Peers> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    Peers::parse(&text).with_context(|| path.display().to_string())
+    let text = input::read_to_string(path).with_context(|| format!("cannot read {}", printable(path)))?;
+    Peers::parse(&text).with_context(|| printable(path))
 }
 
 /// The processor, which on a software driver is the device.
@@ -75,8 +85,10 @@ fn machine() -> String {
 
 /// As it was typed, but for the program's place.
 fn command() -> String {
-    let typed =
-        std::env::args().skip(1).map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
+    let typed = std::env::args_os()
+        .skip(1)
+        .map(printable)
+        .map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
     std::iter::once("cao".to_owned()).chain(typed).collect::<Vec<_>>().join(" ")
 }
 
@@ -93,22 +105,22 @@ fn plan(args: &Args) -> Plan {
 
 fn scenes(args: &Args) -> Result<Vec<Scene>> {
     let (names, radius) = match (args.scenes.is_empty(), args.quick) {
-        (true, false) => (DEFAULT.map(String::from).to_vec(), Some(DEFAULT_RADIUS)),
-        (true, true) => (QUICK.map(String::from).to_vec(), Some(QUICK_RADIUS)),
+        (true, false) => (DEFAULT.map(OsString::from).to_vec(), Some(DEFAULT_RADIUS)),
+        (true, true) => (QUICK.map(OsString::from).to_vec(), Some(QUICK_RADIUS)),
         (false, _) => (args.scenes.clone(), None),
     };
     for (i, name) in names.iter().enumerate() {
         if names[..i].contains(name) {
-            return Err(usage(format!("{name}: is given twice; expected different scenes")));
+            return Err(usage(format!("{}: is given twice; expected different scenes", printable(name))));
         }
     }
     names.iter().map(|name| scene(args, name, radius)).collect()
 }
 
-fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
-    let described = match name.to_lowercase().ends_with(".toml") {
+fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
+    let described = match args::has_extension(name, "toml") {
         true if args.raw.dims.is_some() => {
-            return Err(usage(format!("--dims: the scene {name} says what its volume is")));
+            return Err(usage(format!("--dims: the scene {} says what its volume is", printable(name))));
         }
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
@@ -125,53 +137,7 @@ fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
     };
     let radius_mm = args.radius_mm.or(radius).unwrap_or(resolved.radius_mm);
     let rig = described.stereo.rig(volume.size_mm());
-    Ok(Scene { name: name.into(), volume, state: State { clips, transfer, radius_mm }, rig })
-}
-
-/// The folder that is written to.
-struct Folder<'a> {
-    path: &'a Path,
-    /// Made here, and to be removed again if nothing comes of it.
-    made: bool,
-}
-
-impl<'a> Folder<'a> {
-    /// Makes sure, before anything long begins, that files can be written.
-    fn prepare(args: &'a Args) -> Result<Self> {
-        let path = args.output.as_path();
-        let shown = path.display();
-        if path.exists() && !path.is_dir() {
-            return Err(usage(format!("{shown}: is a file, expected a folder")));
-        }
-        let made = !path.exists();
-        if made {
-            std::fs::create_dir(path).with_context(|| format!("cannot make the folder {shown}"))?;
-        }
-        let folder = Self { path, made };
-        let inputs = || args.scenes.iter().map(Path::new);
-        for file in ["runs.csv", "chart.svg", "chart.png", "report.html"] {
-            let extension = file.split('.').next_back().unwrap_or_default();
-            check_targets(&[&path.join(file)], extension, inputs())?;
-        }
-        Ok(folder)
-    }
-
-    fn write(mut self, files: &[(&str, Vec<u8>)]) -> Result<()> {
-        for (name, content) in files {
-            write_atomic(&self.path.join(name), |file| file.write_all(content))?;
-        }
-        self.made = false;
-        Ok(())
-    }
-}
-
-impl Drop for Folder<'_> {
-    fn drop(&mut self) {
-        if self.made {
-            // Only if it is empty; a failure to tidy up hides no other.
-            let _ = std::fs::remove_dir(self.path);
-        }
-    }
+    Ok(Scene { name: printable(name), volume, state: State { clips, transfer, radius_mm }, rig })
 }
 
 fn summary(out: &mut Out, chart: &Chart) {

@@ -12,14 +12,12 @@ mod render;
 mod stability;
 mod verify;
 
-use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let matches = args::Cli::command().get_matches();
-    let cli = match args::Cli::from_arg_matches(&matches) {
-        Ok(cli) => cli,
-        Err(error) => error.exit(),
+    let (cli, matches) = match cao_cli::parse::<args::Cli>() {
+        Ok(parsed) => parsed,
+        Err(code) => return code,
     };
     // The order of --clip and --clip-* tells which belong together.
     let of_command = matches.subcommand().map_or(&matches, |(_, command)| command);

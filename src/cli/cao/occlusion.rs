@@ -4,20 +4,16 @@ use crate::args::{self, Global, Occlusion, setup};
 use crate::budget;
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
-use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
-use cao_formats::write_nrrd;
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_cli::targets::Targets;
 use clap::ArgMatches;
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
 use std::process::ExitCode;
 
 pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<ExitCode> {
     let also = [&args.opacity_out, &args.mask_out];
-    let targets: Vec<&Path> =
-        [&args.output].into_iter().chain(also.into_iter().flatten()).map(PathBuf::as_path).collect();
-    let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
-    let inputs =
-        [args.input.as_str(), transfer].into_iter().chain(args.clips.clip.iter().map(String::as_str));
-    check_targets(&targets, "nrrd", inputs.map(Path::new))?;
+    let targets = Targets::files([&args.output].into_iter().chain(also.into_iter().flatten()), "nrrd")?;
+    let transfer = args.settings.transfer.as_deref().unwrap_or(OsStr::new("auto"));
     let mut progress = Progress::default();
     let clips = args::clips(matches)?;
     progress.stage("reading");
@@ -25,6 +21,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
@@ -35,14 +32,17 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     check_validation(&gpu)?;
 
     progress.stage("writing");
-    write_nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
-    if let Some(path) = &args.opacity_out {
-        write_nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
-    }
-    if let Some(path) = &args.mask_out {
-        let mask: Vec<f32> = renderer.read_mask()?.into_iter().map(|m| f32::from(m) / 2.0).collect();
-        write_nrrd(path, &volume, &mask, "mask: 0 clipped, 0.5 affected, 1 untouched")?;
-    }
+    targets.write(|files| {
+        files.nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+        if let Some(path) = &args.opacity_out {
+            files.nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
+        }
+        if let Some(path) = &args.mask_out {
+            let mask: Vec<f32> = renderer.read_mask()?.into_iter().map(|m| f32::from(m) / 2.0).collect();
+            files.nrrd(path, &volume, &mask, "mask: 0 clipped, 0.5 affected, 1 untouched")?;
+        }
+        Ok(())
+    })?;
     let categories = renderer.categories()?;
     drop(progress);
 
@@ -56,7 +56,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     out.categories(&categories);
     out.timings(&timings);
     out.memory(&gpu, &volume);
-    for path in targets {
+    for path in targets.paths() {
         out.wrote(path);
     }
     out.finish()?;

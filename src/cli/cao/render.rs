@@ -4,23 +4,28 @@ use crate::args::{self, Global, Render, usage};
 use crate::budget;
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
-use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
-use cao_formats::Picture;
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_cli::targets::Targets;
 use cao_formats::scene::{Scene, Viewpoint};
+use cao_formats::{Outputs, Picture, printable};
 use cao_model::methods::Method;
 use clap::ArgMatches;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitCode> {
-    let targets: Vec<&Path> =
-        args.output.iter().chain(args.eyes.iter().flatten()).map(PathBuf::as_path).collect();
-    check_targets(&targets, "png", inputs(args))?;
+    if !matches!(args.eyes.len(), 0 | 2) {
+        return Err(usage(format!("--eyes: {} files, expected two, LEFT,RIGHT", args.eyes.len())));
+    }
+    let targets = Targets::files(args.output.iter().chain(&args.eyes), "png")?;
     let mut progress = Progress::default();
     progress.stage("reading");
-    let mut scene = match args.input.to_lowercase().ends_with(".toml") {
+    let mut scene = match args::has_extension(&args.input, "toml") {
         true if args.raw.dims.is_some() => {
-            return Err(usage(format!("--dims: the scene {} says what its volume is", args.input)));
+            return Err(usage(format!(
+                "--dims: the scene {} says what its volume is",
+                printable(&args.input)
+            )));
         }
         true => Scene::load(Path::new(&args.input))?,
         false => Scene::default_for(args.raw.source(&args.input)?),
@@ -41,6 +46,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let rig = scene.stereo.rig(volume.size_mm());
     let reach = (rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>()).max(1.0);
     let views = rig.views(size[0] as f32 / size[1] as f32, reach * 1e-4, reach * 2.0)?;
+    targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
@@ -54,7 +60,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     check_validation(&gpu)?;
 
     progress.stage("writing");
-    write(args, &image, scene.image.background)?;
+    targets.write(|files| write(files, args, &image, scene.image.background))?;
     drop(progress);
     let mut out = Out::new(global);
     out.device(&gpu);
@@ -66,7 +72,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     out.image(size);
     out.timings(&timings);
     out.memory(&gpu, &volume);
-    for path in targets {
+    for path in targets.paths() {
         out.wrote(path);
     }
     out.finish()?;
@@ -114,21 +120,15 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     Ok(())
 }
 
-fn write(args: &Render, image: &StereoImage, background: [f32; 3]) -> Result<()> {
+fn write(files: &mut Outputs, args: &Render, image: &StereoImage, background: [f32; 3]) -> Result<()> {
     let [width, height] = image.size;
     let [left, right] = image.colour.each_ref().map(|eye| Picture::over(width, height, eye, background));
+    let mut put = |path: &Path, picture: &Picture| -> Result<()> {
+        let png = picture.png()?;
+        Ok(files.write(path, |file| file.write_all(&png))?)
+    };
     if let Some(path) = &args.output {
-        Picture::beside(&left, &right).write_png(path)?;
+        put(path, &Picture::beside(&left, &right))?;
     }
-    if let Some([left_path, right_path]) = &args.eyes {
-        left.write_png(left_path)?;
-        right.write_png(right_path)?;
-    }
-    Ok(())
-}
-
-/// Files that must not be overwritten.
-fn inputs(args: &Render) -> impl Iterator<Item = &Path> {
-    let given = [Some(&args.input), args.settings.transfer.as_ref()].into_iter().flatten();
-    given.chain(&args.clips.clip).map(Path::new)
+    args.eyes.iter().zip([&left, &right]).try_for_each(|(path, eye)| put(path, eye))
 }

@@ -1,9 +1,10 @@
 //! `cao stability`: the trials of where methods fail, as data, charts and one sentence each.
 
 use crate::args::{Global, Stability, usage};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
-use cao_formats::write_atomic;
+use cao_cli::targets::Targets;
+use cao_formats::{Outputs, printable};
 use cao_measure::stability::{Effort, Finding, Ours, TRIALS, Trial, page};
 use serde_json::json;
 use std::path::Path;
@@ -21,27 +22,24 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     }
     let folder = args.output.as_deref().ok_or_else(|| usage("-o DIR is missing: where to write"))?;
     if folder.exists() && !folder.is_dir() {
-        bail!("cannot write into {}: it is a file, expected a folder or a new name", folder.display());
+        bail!("cannot write into {}: it is a file, expected a folder or a new name", printable(folder));
     }
     let trials = match args.only.is_empty() {
         true => TRIALS.to_vec(),
         false => args.only.clone(),
     };
     let effort = if args.quick { Effort::Quick } else { Effort::Full };
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    let index = "index.html".to_owned();
+    let targets = Targets::in_folder(folder, trials.iter().map(data).chain([index.clone()]))?;
 
     let mut progress = Progress::default();
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     out.device(&gpu);
-    std::fs::create_dir_all(folder)
-        .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let mut findings = Vec::new();
     for trial in trials {
         progress.stage(trial.name);
         let finding = (trial.run)(&gpu, effort, &mut |done| progress.set(done))?;
-        write(folder, trial, &finding)?;
         findings.push((trial, finding));
     }
     drop(progress);
@@ -55,8 +53,11 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
         info.driver
     );
     let html = page::html(&head, &findings);
-    let index = folder.join("index.html");
-    write_atomic(&index, |file| file.write_all(html.as_bytes()))?;
+    let index = folder.join(index);
+    targets.write(|files| {
+        findings.iter().try_for_each(|(trial, finding)| write(files, folder, trial, finding))?;
+        Ok(files.write(&index, |file| file.write_all(html.as_bytes()))?)
+    })?;
     for (trial, finding) in &findings {
         out.line(format!("{:<10} {:<8} {}", trial.name, finding.ours.name(), finding.sentence));
         if !finding.control_fails {
@@ -81,9 +82,14 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     Ok(if all_good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn write(folder: &Path, trial: Trial, finding: &Finding) -> Result<()> {
-    let put = |name: String, bytes: &[u8]| write_atomic(&folder.join(name), |file| file.write_all(bytes));
-    put(format!("{}.csv", trial.name), page::csv(finding).as_bytes())?;
+/// Name of the file with a trial's data.
+fn data(trial: &Trial) -> String {
+    format!("{}.csv", trial.name)
+}
+
+fn write(files: &mut Outputs, folder: &Path, trial: &Trial, finding: &Finding) -> Result<()> {
+    let mut put = |name: String, bytes: &[u8]| files.write(&folder.join(name), |file| file.write_all(bytes));
+    put(data(trial), page::csv(finding).as_bytes())?;
     for (n, chart) in finding.charts.iter().enumerate() {
         let drawing = page::draw(chart, &finding.setting);
         put(format!("{}-{}.svg", trial.name, n + 1), drawing.svg().as_bytes())?;

@@ -4,6 +4,7 @@ use crate::args::{self, Global, PROOF, Verified, Verify, setup};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_formats::printable;
 use cao_gpu::Timings;
 use cao_measure::exactness::{Plan, Report, verify};
 use cao_model::METHODS;
@@ -11,6 +12,7 @@ use cao_model::clip::Shape;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use serde_json::json;
+use std::ffi::OsStr;
 use std::process::ExitCode;
 
 /// The built-in scenes, at a size that takes seconds each with each method; the last has anisotropic spacing.
@@ -18,9 +20,9 @@ const BUILT_IN: [&str; 4] =
     ["builtin:engine:40", "builtin:fruit:32", "builtin:skeleton:40", "builtin:engine:40x36x20:1,1,2"];
 
 pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
-    let names = match args.input.as_str() {
-        "built-in" => BUILT_IN.to_vec(),
-        input => vec![input],
+    let names = match args.input == "built-in" {
+        true => BUILT_IN.map(OsStr::new).to_vec(),
+        false => vec![args.input.as_os_str()],
     };
     let shapes = match args.shapes.is_empty() {
         true => Shape::ANALYTIC.to_vec(),
@@ -33,11 +35,11 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     let mut inputs = Vec::new();
     for name in names {
         let volume = args.raw.open(name)?;
-        let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
+        let transfer = args.settings.transfer.as_deref().unwrap_or(OsStr::new("auto"));
         let transfer = cao_formats::transfer::load(transfer, volume.range())?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
-        inputs.push((name, volume, setups, transfer));
+        inputs.push((printable(name), volume, setups, transfer));
     }
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
@@ -54,10 +56,10 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
             progress.stage("verifying");
             progress.say(&format!("verifying {}", setup.method.name()));
             let report = verify(&mut renderer, &plan, &mut |done| progress.set(done))?;
-            print(&mut out, input, setup.method, &report, args.seed);
+            print(&mut out, &input, setup.method, &report, args.seed);
             exact &= report.exact();
             vacuous |= report.vacuous();
-            reports.push(as_json(input, setup.method, &report));
+            reports.push(as_json(&input, setup.method, &report));
         }
     }
     drop(progress);

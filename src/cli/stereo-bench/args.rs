@@ -4,6 +4,7 @@ use super::scale::Series;
 use super::way::Way;
 use cao_cli::args::{Global, Raw, Settings, methods_help, size};
 use clap::Parser;
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 /// Times frames for one, two or four views while head and clip move, method by method.
@@ -12,7 +13,7 @@ use std::path::PathBuf;
 pub struct Cli {
     /// Volume file or builtin:NAME:SIZE
     #[arg(default_value = "builtin:engine:128")]
-    pub input: String,
+    pub input: OsString,
     #[arg(long, value_name = "METHOD,...", value_delimiter = ',', value_parser = Way::parse, default_values_t = Way::all(),
         help = format!(
             "Methods, which take turns frame by frame. solid: no occlusion; {}; cao-literal: cao by the paper's recipe to the letter. One that \
@@ -37,7 +38,7 @@ pub struct Cli {
     pub warm_up: u32,
     /// Shape that moves through the volume: plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; none for no clip
     #[arg(long, value_name = "SHAPE|MESH.obj", default_value = "sphere")]
-    pub clip: String,
+    pub clip: OsString,
     /// Compute every voxel, not only those that a sample with opacity can touch
     #[arg(long)]
     pub all_voxels: bool,

@@ -17,6 +17,7 @@ use cao::field::transfer::TransferBuffer;
 use cao::host::read_values;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_formats::printable;
 use cao_gpu::{Access, DeviceKind, Gpu, Phase, Stage};
 use cao_measure::error::errors;
 use cao_measure::random::Random;
@@ -107,8 +108,7 @@ impl Scene {
 
     fn real(folder: &Path, name: &str, threshold: f32) -> Result<Self> {
         let path = folder.join("volumes").join(name);
-        let volume = cao_formats::open(&path.to_string_lossy())
-            .with_context(|| format!("--data {}", folder.display()))?;
+        let volume = cao_formats::open(&path).with_context(|| format!("--data {}", printable(folder)))?;
         Self::new(name.split('_').next().unwrap_or(name), volume, threshold)
     }
 

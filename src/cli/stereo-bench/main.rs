@@ -20,10 +20,12 @@ mod statistics;
 mod suite;
 mod way;
 
-use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
+    let cli = match cao_cli::parse::<args::Cli>() {
+        Ok((cli, _)) => cli,
+        Err(code) => return code,
+    };
     cao_cli::end("stereo-bench", if cli.bars { bars::run(&cli) } else { suite::run(&cli) })
 }

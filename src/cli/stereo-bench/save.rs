@@ -1,60 +1,28 @@
 //! A run kept for later: raw numbers, the summary that was printed, and how to repeat it.
 
 use super::machine;
-use anyhow::{Context, Result};
+use anyhow::Result;
+use cao_cli::targets::Targets;
+use cao_formats::printable;
 use cao_gpu::Gpu;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// A run's own folder.
-pub struct Folder(PathBuf);
-
-impl Folder {
-    /// Makes it in `parent`: `<date>-<device>`, with a number where that is taken. Before anything long begins, so that what cannot
-    /// be written is known early.
-    pub fn new(parent: &Path, gpu: &Gpu) -> Result<Self> {
-        let [year, month, day] = machine::today();
-        let name = format!("{year:04}-{month:02}-{day:02}-{}", plain(&gpu.info().name));
-        fs::create_dir_all(parent).with_context(|| format!("cannot make the folder {}", parent.display()))?;
-        let mut path = parent.join(&name);
-        let mut number = 1;
-        loop {
-            match fs::create_dir(&path) {
-                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                    number += 1;
-                    path = parent.join(format!("{name}-{number}"));
-                }
-                made => {
-                    made.with_context(|| format!("cannot make the folder {}", path.display()))?;
-                    return Ok(Self(path));
-                }
-            }
-        }
+/// The run's own folder in `parent`: `<date>-<device>`, with a number where that is taken; and the files in it.
+pub fn targets(parent: &Path, gpu: &Gpu) -> Result<Targets> {
+    let [year, month, day] = machine::today();
+    let name = format!("{year:04}-{month:02}-{day:02}-{}", plain(&gpu.info().name));
+    let mut folder = parent.join(&name);
+    let mut number = 1;
+    while folder.symlink_metadata().is_ok() {
+        number += 1;
+        folder = parent.join(format!("{name}-{number}"));
     }
-
-    /// Writes the three files and returns their paths; `machine` describes it as the run began.
-    pub fn write(&self, gpu: &Gpu, machine: &str, csv: &str, summary: &str) -> Result<Vec<PathBuf>> {
-        let files = [
-            ("raw.csv", csv.to_owned()),
-            ("summary", summary.to_owned()),
-            ("README.md", readme(gpu, machine)),
-        ];
-        files
-            .into_iter()
-            .map(|(name, text)| {
-                let path = self.0.join(name);
-                fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-                Ok(path)
-            })
-            .collect()
-    }
+    Targets::in_folder(&folder, ["raw.csv", "summary", "README.md"].map(str::to_owned))
 }
 
-impl Drop for Folder {
-    /// A run that failed leaves no empty folder; one that holds anything cannot be removed so.
-    fn drop(&mut self) {
-        let _ = fs::remove_dir(&self.0);
-    }
+/// What is in the files; `machine` describes it as the run began.
+pub fn contents(gpu: &Gpu, machine: &str, csv: String, summary: String) -> [String; 3] {
+    [csv, summary, readme(gpu, machine)]
 }
 
 fn readme(gpu: &Gpu, machine: &str) -> String {
@@ -87,7 +55,7 @@ fn command() -> String {
         let value = std::env::var(key).ok().filter(|value| !value.is_empty())?;
         Some(format!("{key}={}", quoted(&value)))
     });
-    let arguments = std::env::args().skip(1).map(|argument| quoted(&argument));
+    let arguments = std::env::args_os().skip(1).map(|argument| quoted(&printable(argument)));
     environment.chain(["stereo-bench".into()]).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 

@@ -5,6 +5,7 @@ use anyhow::Result;
 use cao_cli::args::usage;
 use cao_model::builtin::builtin_box;
 use cao_model::occlusion::RaySet;
+use std::ffi::OsStr;
 use std::rc::Rc;
 
 /// What is varied.
@@ -46,7 +47,7 @@ impl Series {
     pub fn configurations(
         self,
         base: &Configuration,
-        transfer: &str,
+        transfer: &OsStr,
     ) -> Result<Vec<(String, Configuration)>> {
         const UP_TO: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
         Ok(match self {
@@ -81,7 +82,7 @@ impl Series {
 }
 
 /// The built-in volume with other dimensions, of the same spacing, and the radius in mm as it was.
-fn resized(base: &Configuration, share: f64, transfer: &str) -> Result<(String, Configuration)> {
+fn resized(base: &Configuration, share: f64, transfer: &OsStr) -> Result<(String, Configuration)> {
     let name = &base.input.name;
     let Some(scene) = name.strip_prefix("builtin:").and_then(|rest| rest.split(':').next()) else {
         return Err(usage(format!(

@@ -3,15 +3,16 @@
 use super::args::Cli;
 use super::frames::{Configuration, Input, Measured, Plan, measure};
 use super::path::PERIOD;
-use super::save::Folder;
-use super::{csv, machine, report};
+use super::{csv, machine, report, save};
 use anyhow::{Context, Result};
 use cao_cli::args::{open, setup, shape, usage};
-use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_cli::targets::Targets;
+use cao_formats::printable;
 use cao_gpu::DeviceKind;
 use cao_model::methods::Method;
 use serde_json::{Map, json};
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
 use std::process::ExitCode;
 use std::rc::Rc;
 
@@ -19,15 +20,14 @@ use std::rc::Rc;
 const SOFTWARE_FRAMES: u32 = 10;
 
 pub fn run(cli: &Cli) -> Result<ExitCode> {
-    let transfer = cli.settings.transfer.as_deref().unwrap_or("auto");
-    let inputs = [cli.input.as_str(), transfer, &cli.clip];
-    let targets: Vec<&Path> = cli.csv.iter().map(PathBuf::as_path).collect();
-    check_targets(&targets, "csv", inputs.into_iter().map(Path::new))?;
+    let transfer = cli.settings.transfer.as_deref().unwrap_or(OsStr::new("auto"));
+    let table = Targets::files(&cli.csv, "csv")?;
     let mut plan = plan(cli)?;
     let mut progress = Progress::default();
     progress.stage("reading");
     let base = base(cli, transfer)?;
     let groups = groups(cli, base, transfer)?;
+    table.spare_inputs()?;
 
     progress.stage("preparing");
     let gpu = open_gpu(&cli.global)?;
@@ -36,7 +36,9 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         DeviceKind::Cpu => SOFTWARE_FRAMES,
         _ => PERIOD,
     });
-    let kept = cli.save.as_deref().map(|folder| Folder::new(folder, &gpu)).transpose()?;
+    // The folder's name is found anew at the end: another run may have taken it.
+    let keep = || cli.save.as_deref().map(|parent| save::targets(parent, &gpu)).transpose();
+    keep()?;
     let machine = machine::describe();
     progress.stage("measuring");
     let points: usize = groups.iter().map(|group| group.points.len()).sum();
@@ -68,15 +70,16 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     if let Some(base) = results.first() {
         out.json(json!({ "path": report::path_json(&base.configuration, &plan)? }));
     }
-    let (table, summary) = (csv::table(&results), out.text().to_owned());
-    if let Some(path) = &cli.csv {
-        std::fs::write(path, &table).with_context(|| format!("cannot write {}", path.display()))?;
-        out.wrote(path);
+    let text = csv::table(&results);
+    let mut contents = vec![text.clone(); table.paths().len()];
+    let mut targets = table;
+    if let Some(kept) = keep()? {
+        targets = targets.and(kept);
+        contents.extend(save::contents(&gpu, &machine, text, out.text().to_owned()));
     }
-    if let Some(folder) = kept {
-        for path in folder.write(&gpu, &machine, &table, &summary)? {
-            out.wrote(&path);
-        }
+    targets.write_all(&contents)?;
+    for path in targets.paths() {
+        out.wrote(path);
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
@@ -90,14 +93,14 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
     out.line(format!("views     {views} of {} x {} pixels, in one dispatch", size[0], size[1]));
-    out.line(format!("clip      {}", cli.clip));
+    out.line(format!("clip      {}", printable(&cli.clip)));
     out.line(match cli.all_voxels {
         true => "voxels    all",
         false => "voxels    those that a sample with opacity can touch",
     });
     out.line(report::tables(plan, &base.measured).trim_end());
     out.json(json!({
-        "clip": cli.clip,
+        "clip": cli.clip.to_string_lossy(),
         "all_voxels": cli.all_voxels,
         "runs": plan.runs,
         "frames_a_run": plan.frames,
@@ -132,7 +135,7 @@ struct Group {
 }
 
 /// The base configuration by itself, then every series.
-fn groups(cli: &Cli, base: Configuration, transfer: &str) -> Result<Vec<Group>> {
+fn groups(cli: &Cli, base: Configuration, transfer: &OsStr) -> Result<Vec<Group>> {
     let mut groups = vec![Group { series: "base", points: vec![(String::new(), base.clone())] }];
     for series in &cli.scale {
         if groups.iter().any(|group| group.series == series.name()) {
@@ -149,20 +152,20 @@ fn plan(cli: &Cli) -> Result<Plan> {
             return Err(usage(format!("--methods: {method} is given twice")));
         }
     }
-    let clip = match cli.clip.as_str() {
-        "none" => None,
-        name => Some(shape(name).with_context(|| format!("--clip {name}"))?),
+    let clip = match cli.clip == "none" {
+        true => None,
+        false => Some(shape(&cli.clip).with_context(|| format!("--clip {}", printable(&cli.clip)))?),
     };
     let methods = cli.methods.clone();
     Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up })
 }
 
-fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
+fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {
     let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
     // A rule asks for a method that has it; other methods take their own.
     let method = cli.settings.quadrature.map_or(Method::Cao, |rule| Method::for_rule(Some(rule)));
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
-    let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
+    let input = Rc::new(Input { name: printable(&cli.input), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }
