@@ -1,5 +1,6 @@
 //! What can go wrong with a file, said so that the user knows what to do next.
 
+use cao_model::error::{MOST_NAMED, MOST_SAID, shown, shown_path};
 use std::path::{Path, PathBuf};
 
 /// Result with the crate's [`Error`].
@@ -10,7 +11,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused a file.
-    #[error("cannot access {}", path.display())]
+    #[error("cannot access {}", shown_path(path))]
     Io {
         /// File that was read or written.
         path: PathBuf,
@@ -18,7 +19,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file's content is not what its format or its header says.
-    #[error("{}: {field}: {problem}", path.display())]
+    #[error("{}: {}: {}", shown_path(path), shown(field, MOST_NAMED), shown(problem, MOST_SAID))]
     File {
         /// The file.
         path: PathBuf,
@@ -36,6 +37,11 @@ impl Error {
     /// The refusal of the setting `what`.
     pub(crate) fn refused(what: &str, problem: impl Into<String>) -> Self {
         cao_model::Error::refused(what, problem).into()
+    }
+
+    /// The refusal of what a file says in `field`.
+    pub(crate) fn file(path: &Path, field: &str, problem: impl Into<String>) -> Self {
+        Self::File { path: path.into(), field: field.into(), problem: problem.into() }
     }
 
     /// The same refusal of a setting that is part of `section`.

@@ -4,14 +4,19 @@
 #![forbid(unsafe_code)]
 
 pub mod error;
+pub mod file;
 mod grid;
+mod gzip;
+mod memory;
 mod metaimage;
 mod nifti;
 mod nrrd;
 pub mod obj;
+mod parts;
 mod payload;
 pub mod picture;
 mod raw;
+mod reading;
 pub mod scene;
 mod text;
 mod toml_value;
@@ -22,6 +27,7 @@ mod write;
 pub use error::{Error, Result};
 pub use picture::Picture;
 pub use raw::read_raw;
+pub use reading::{NoNumbers, Opened, Reading};
 pub use scene::Scene;
-pub use volume::{open, read};
+pub use volume::{open, read, read_as};
 pub use write::{write_atomic, write_nrrd};

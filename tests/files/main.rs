@@ -4,8 +4,10 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod hostile;
 mod house;
 mod mesh;
+mod readings;
 mod scene;
 mod shaders;
 mod transfer;

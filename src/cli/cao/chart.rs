@@ -60,7 +60,7 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
 }
 
 fn read_peers(path: &Path) -> Result<Peers> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = cao_formats::file::read_text(path)?;
     Peers::parse(&text).with_context(|| path.display().to_string())
 }
 
@@ -113,11 +113,12 @@ fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };
-    let volume = args::open(&described.volume, name)?;
+    let mut volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
     let transfer = match &args.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range())?,
         None => described.transfer(volume.range())?,
     };
+    args::hide(&mut volume, &transfer, name)?;
     let resolved = described.occlusion.setup(volume.min_spacing())?.occlusion;
     let clips = match described.clips.is_empty() {
         true => vec![Scene::default_clip(&volume)],

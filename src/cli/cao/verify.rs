@@ -32,9 +32,10 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     // All of them before the device works for minutes on the first.
     let mut inputs = Vec::new();
     for name in names {
-        let volume = args.raw.open(name)?;
+        let mut volume = args.raw.open(name)?;
         let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
         let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+        args::hide(&mut volume, &transfer, name)?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
         inputs.push((name, volume, setups, transfer));

@@ -6,7 +6,7 @@ use super::path::PERIOD;
 use super::save::Folder;
 use super::{csv, machine, report};
 use anyhow::{Context, Result};
-use cao_cli::args::{open, setup, shape, usage};
+use cao_cli::args::{hide, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use cao_gpu::DeviceKind;
 use cao_model::methods::Method;
@@ -158,11 +158,12 @@ fn plan(cli: &Cli) -> Result<Plan> {
 }
 
 fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
-    let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
+    let mut volume = cli.raw.open(&cli.input)?;
     // A rule asks for a method that has it; other methods take their own.
     let method = cli.settings.quadrature.map_or(Method::Cao, |rule| Method::for_rule(Some(rule)));
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    hide(&mut volume, &transfer, &cli.input)?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }
