@@ -87,8 +87,8 @@ fn pipes_devices_sockets_and_folders_are_refused_by_name_without_waiting() {
     let mut nifti = Nifti::new(1, &nrrd_values(), Endian::Little);
     nifti.header[345] = b'i';
     let header = folder.put("pipe.hdr", &nifti.header);
-    let said = said("pair", move || cao_formats::read(&header)).unwrap_err();
-    assert!(said.contains("pipe.img") && said.contains("a pipe"), "{said}");
+    let message = said("pair", move || cao_formats::read(&header)).unwrap_err();
+    assert!(message.contains("pipe.img") && message.contains("a pipe"), "{message}");
 }
 
 #[test]
@@ -115,13 +115,13 @@ fn holes_without_end_are_read_to_a_limit_that_the_refusal_states() {
     }
     let lines = nrrd_header(&[("line skip", Some("3"))]) + "data file: holes\n";
     let path = folder.put("lines.nhdr", lines.as_bytes());
-    let said = said("line skip", move || cao_formats::read(&path)).unwrap_err();
-    assert!(said.contains("line skip") && said.contains("16777216 bytes"), "{said}");
+    let message = said("line skip", move || cao_formats::read(&path)).unwrap_err();
+    assert!(message.contains("line skip") && message.contains("16777216 bytes"), "{message}");
     for (name, start) in [("head.nrrd", "NRRD0004\n"), ("head.mha", "NDims = 3\n")] {
         let path = folder.put(name, start.as_bytes());
         std::fs::OpenOptions::new().write(true).open(&path).unwrap().set_len(1 << 40).unwrap();
-        let said = said(name, move || cao_formats::read(&path)).unwrap_err();
-        assert!(said.contains(name) && said.contains("no end within 16777216 bytes"), "{said}");
+        let message = said(name, move || cao_formats::read(&path)).unwrap_err();
+        assert!(message.contains(name) && message.contains("no end within 16777216 bytes"), "{message}");
     }
 }
 

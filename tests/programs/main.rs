@@ -5,5 +5,6 @@ mod chart;
 mod cli;
 mod cli_refusals;
 mod peers;
+mod readings;
 mod stereo_bench;
 mod support;
