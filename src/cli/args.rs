@@ -179,14 +179,21 @@ pub fn open(source: &VolumeSource, reading: Reading, input: &str) -> Result<Volu
     Ok(opened.volume)
 }
 
-/// Gives voxels that hold no number, where the user asked for it, a value without opacity.
-pub fn hide(volume: &mut Volume, transfer: &TransferFunction, input: &str) -> Result<()> {
-    match volume.values.non_finite() {
-        Some(_) => {
-            volume.hide_no_numbers(transfer).map(drop).with_context(|| format!("{input}: --nan transparent"))
-        }
-        None => Ok(()),
+/// The transfer function of a volume, of which voxels that hold no number get a value without opacity where the user asked for that;
+/// errors name `input`, also where the library knows of no file.
+pub fn transfer(
+    loaded: cao_formats::Result<TransferFunction>,
+    volume: &mut Volume,
+    input: &str,
+) -> Result<TransferFunction> {
+    let transfer = match loaded {
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| input.to_owned())?,
+        other => other?,
+    };
+    if volume.values.non_finite().is_some() {
+        volume.hide_no_numbers(&transfer).with_context(|| format!("{input}: --nan transparent"))?;
     }
+    Ok(transfer)
 }
 
 /// An analytic shape or a mesh file.

@@ -134,8 +134,8 @@ impl<'a> Header<'a> {
         self.fields.path
     }
 
-    /// Which three axes are those of space, and which volume of a series: axes of one sample do not count; a fourth one is that of the
-    /// series.
+    /// Which three axes are those of space, and which volume of a series. Beyond three, the axis of a series is what is called time or
+    /// list, else the last one; axes of one sample do not count.
     fn axes(&self, reading: &Reading) -> Result<([usize; 3], Frame)> {
         let directions = self.directions()?;
         let kinds: Vec<String> = self.fields.get("kinds").map(words).unwrap_or_default();
@@ -144,21 +144,31 @@ impl<'a> Header<'a> {
             |a: usize| directions.as_ref().is_none_or(|d| d[a].as_ref().is_some_and(|v| v[..3] != [0.0; 3]));
         let any = |a: usize| ["", "domain", "space", "none", "???"].contains(&kind(a).as_str());
         let spatial = |a: usize| any(a) && in_space(a);
-        let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
         let single = |a: &usize| self.sizes[*a] == 1;
-        while axes.len() > 3 {
-            // The one that says it is not spatial, else the slowest.
-            let drop = axes.iter().position(|a| single(a) && !spatial(*a));
-            let Some(drop) = drop.or_else(|| axes.iter().rposition(single)) else { break };
-            axes.remove(drop);
-        }
+        // By its name, or by a vector that leads out of space.
+        let timely = |a: &usize| {
+            let out = directions.as_ref().is_some_and(|d| d[*a].is_some()) && !in_space(*a);
+            out || ["time", "list"].contains(&kind(*a).as_str())
+        };
+        let declared = |a: &usize| in_space(*a) && (directions.is_some() || any(*a) && kind(*a) != "");
+        let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
         let mut series = None;
-        if axes.len() == 4 {
-            // What is called so, wherever it stands, else the slowest.
-            let called = axes.iter().position(|a| ["time", "list"].contains(&kind(*a).as_str()));
-            let at = called.unwrap_or(3);
-            if called.is_some() || any(axes[at]) {
-                series = Some((at, axes.remove(at)));
+        while axes.len() > 3 {
+            let last = axes.len() - 1;
+            if let Some(at) = axes.iter().position(|a| single(a) && !spatial(*a)) {
+                axes.remove(at);
+            } else if let (None, Some(at)) = (series, axes.iter().position(timely)) {
+                series = Some(axes.remove(at));
+            } else if single(&axes[last]) {
+                axes.pop();
+            } else if series.is_none() && axes.iter().all(declared) {
+                series = axes.pop();
+            } else if let Some(at) = axes.iter().rposition(single) {
+                axes.remove(at);
+            } else if series.is_none() && any(axes[last]) {
+                series = axes.pop();
+            } else {
+                break;
             }
         }
         let Ok(axes) = <[usize; 3]>::try_from(axes) else {
@@ -175,13 +185,16 @@ impl<'a> Header<'a> {
                 format!("axis {a} is not an axis of space (vectors or a list?), expected three that are");
             return Err(bad(self.path(), field, problem));
         }
-        let (at, axis) = series.unwrap_or((3, self.sizes.len()));
-        if ![0, 3].contains(&at) {
+        let axis = series.unwrap_or(self.sizes.len());
+        let alone = |axes: &[u64]| axes.iter().all(|n| *n == 1);
+        let (first, last) =
+            (alone(&self.sizes[..axis]), alone(self.sizes.get(axis + 1..).unwrap_or_default()));
+        if !first && !last {
             let problem = format!("axis {axis} is that of a series, expected it to be the first or the last");
             return Err(bad(self.path(), "kinds", problem));
         }
         let count = self.sizes.get(axis).copied().unwrap_or(1);
-        let frame = Frame::choose(reading, count, at == 0).map_err(|p| bad(self.path(), "sizes", p))?;
+        let frame = Frame::choose(reading, count, !last).map_err(|p| bad(self.path(), "sizes", p))?;
         Ok((axes, frame))
     }
 

@@ -132,7 +132,7 @@ fn a_hole_as_large_as_the_header_says_is_refused_where_it_does_not_fit_the_memor
         let line = meminfo.lines().find_map(|line| line.strip_prefix(name)).unwrap();
         line.trim().trim_end_matches(" kB").parse().unwrap()
     };
-    let slices = ((kilobytes("MemAvailable:") + kilobytes("SwapFree:") + (2 << 20)) << 10) >> 20;
+    let slices = ((kilobytes("MemTotal:") + kilobytes("SwapTotal:") + (1 << 20)) << 10) >> 20;
     let folder = Folder::new();
     let sizes = format!("1024 1024 {slices}");
     let header = nrrd_header(&[("sizes", Some(&sizes)), ("type", Some("uint8"))]);

@@ -156,6 +156,53 @@ fn four_axes_as_itk_writes_them_are_a_volume_or_a_series() {
     assert_refused(cao_formats::read(&path), &path, "TransformMatrix", &["9 numbers, expected 16"]);
 }
 
+/// A series of single slices, which must not become a stack of its moments.
+#[test]
+fn a_series_of_slices_stays_one() {
+    let folder = Folder::new();
+    let data = bytes_of(&nrrd_values(), Endian::Little);
+    let half = |second: bool| nrrd_part(if second { 15..30 } else { 0..15 });
+    let itk = itk_nrrd("5 3 1 2", "space dimension: 4");
+    let four = |kinds| {
+        [
+            ("dimension", Some("4")),
+            ("sizes", Some("5 3 1 2")),
+            ("spacings", Some("1 1 1 1")),
+            ("kinds", kinds),
+        ]
+    };
+    let mut nifti = Nifti::new(1, &nrrd_values(), Endian::Little);
+    nifti.dim(&[4, 5, 3, 1, 2]);
+    let meta = meta_header(&[("NDims", "4"), ("DimSize", "5 3 1 2"), ("ElementSpacing", "1 1 1 1")]);
+    for (name, content) in [
+        ("itk.nrrd", joined(&itk, &data)),
+        ("a.nrrd", joined(&(nrrd_header(&four(Some("domain domain domain domain"))) + "\n"), &data)),
+        ("b.nrrd", joined(&(nrrd_header(&four(Some("space space space time"))) + "\n"), &data)),
+        ("a.nii", nifti.file()),
+        ("a.mha", joined(&meta, &data)),
+    ] {
+        let path = folder.put(name, &content);
+        for second in [false, true] {
+            let volume = read_as(&path, &frame(second.into())).unwrap().volume;
+            assert_eq!((volume.dims, volume.values), ([5, 3, 1], half(second)), "{name}");
+        }
+        assert!(
+            cao_formats::read(&path).unwrap_err().to_string().contains("a series of 2 volumes"),
+            "{name}"
+        );
+    }
+    // Nothing says that the last axis is time: the one of one sample is the odd one.
+    let path = folder.put("c.nrrd", &joined(&(nrrd_header(&four(None)) + "\n"), &data));
+    assert_eq!(cao_formats::read(&path).unwrap().dims, [5, 3, 2]);
+}
+
+fn nrrd_part(range: std::ops::Range<usize>) -> Values {
+    match nrrd_values() {
+        Values::I16(values) => Values::I16(values[range].to_vec()),
+        other => other,
+    }
+}
+
 #[test]
 fn metaimage_and_nifti_frames_come_one_by_one_whatever_the_encoding() {
     let folder = Folder::new();
@@ -230,7 +277,6 @@ fn a_frame_of_a_series_that_no_memory_holds_is_read() {
 /// Files of every format with `padded` of the data in their place; each with the file that ends too late.
 fn with_data(folder: &Folder, compressed: bool, padded: &dyn Fn(&[u8]) -> Vec<u8>) -> Vec<(String, Vec<u8>)> {
     let data = bytes_of(&nrrd_values(), Endian::Little);
-    let whole = |bytes: &[u8]| padded(bytes);
     let nifti = Nifti::new(1, &nrrd_values(), Endian::Little);
     let encoding = if compressed { "gzip" } else { "raw" };
     let flag = if compressed { "True" } else { "False" };
@@ -238,15 +284,15 @@ fn with_data(folder: &Folder, compressed: bool, padded: &dyn Fn(&[u8]) -> Vec<u8
     pair.header[345] = b'i';
     pair.offset(0.0);
     let (header, image) = if compressed { ("p.hdr", "p.img.gz") } else { ("p.hdr", "p.img") };
-    folder.put(image, &whole(&data));
-    folder.put("d.raw", &whole(&data));
+    folder.put(image, &padded(&data));
+    folder.put("d.raw", &padded(&data));
     let nrrd = nrrd_header(&[("encoding", Some(encoding))]);
     let meta = [("CompressedData", flag)];
     vec![
-        ("a.nrrd".into(), joined(&(nrrd.clone() + "\n"), &whole(&data))),
+        ("a.nrrd".into(), joined(&(nrrd.clone() + "\n"), &padded(&data))),
         ("a.nhdr".into(), (nrrd + "data file: d.raw\n").into_bytes()),
-        ("a.mha".into(), joined(&meta_header(&meta), &whole(&data))),
-        ("a.nii".into(), whole(&nifti.file())),
+        ("a.mha".into(), joined(&meta_header(&meta), &padded(&data))),
+        ("a.nii".into(), padded(&nifti.file())),
         (header.into(), pair.header.clone()),
     ]
 }

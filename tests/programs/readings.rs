@@ -79,6 +79,19 @@ fn voxels_without_a_number_are_transparent_in_opacity_and_picture() {
     let run = folder.run("render nan.nrrd -o s.png --size 64x64");
     assert!(run.code == Some(1) && run.err.contains("--nan VALUE|transparent"), "{}", run.err);
 
+    let answer = folder.json("info nan.nrrd --nan transparent");
+    let counted: u64 = answer["histogram"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum();
+    assert_eq!((&answer["no_number"], counted), (&6.into(), 114));
+    assert!(folder.ok("info nan.nrrd --nan transparent").contains("no number 6 voxels"));
+    // The largest number for no data: the message speaks of the data and of what to do.
+    let no_data = values.iter().map(|v| if v.is_nan() { f32::MAX } else { v.clamp(1000.0, f32::MAX) });
+    folder.put("max.nrrd", nrrd("float", "6 5 4", "1 1 1", &floats(no_data)));
+    let run = folder.run("render max.nrrd -o s.png");
+    for part in ["max.nrrd", "preset \"auto\"", "the data run from 1000", "--nan VALUE|transparent"] {
+        assert!(run.code == Some(1) && run.err.contains(part), "{part}: {}", run.err);
+    }
+    folder.ok("render max.nrrd --nan transparent -o s.png --size 16x16");
+
     // Opaque below, so that what is transparent is found above.
     folder.put("low.toml", "opacity = [[1000, 0.9], [1090, 0.3], [1095, 0.0]]\ncolour = \"#ffffff\"");
     folder.put("all.toml", "opacity = [[1000, 0.9], [1090, 0.3]]\ncolour = \"#ffffff\"");

@@ -115,10 +115,10 @@ fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
     };
     let mut volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
     let transfer = match &args.transfer {
-        Some(spec) => cao_formats::transfer::load(spec, volume.range())?,
-        None => described.transfer(volume.range())?,
+        Some(spec) => cao_formats::transfer::load(spec, volume.range()),
+        None => described.transfer(volume.range()),
     };
-    args::hide(&mut volume, &transfer, name)?;
+    let transfer = args::transfer(transfer, &mut volume, name)?;
     let resolved = described.occlusion.setup(volume.min_spacing())?.occlusion;
     let clips = match described.clips.is_empty() {
         true => vec![Scene::default_clip(&volume)],

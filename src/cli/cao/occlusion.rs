@@ -24,8 +24,8 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut volume = args.raw.open(&args.input)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
-    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
-    args::hide(&mut volume, &transfer, &args.input)?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range());
+    let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;

@@ -34,8 +34,8 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     for name in names {
         let mut volume = args.raw.open(name)?;
         let transfer = args.settings.transfer.as_deref().unwrap_or("auto");
-        let transfer = cao_formats::transfer::load(transfer, volume.range())?;
-        args::hide(&mut volume, &transfer, name)?;
+        let transfer = cao_formats::transfer::load(transfer, volume.range());
+        let transfer = args::transfer(transfer, &mut volume, name)?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
         inputs.push((name, volume, setups, transfer));

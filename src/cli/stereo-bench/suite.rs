@@ -6,7 +6,7 @@ use super::path::PERIOD;
 use super::save::Folder;
 use super::{csv, machine, report};
 use anyhow::{Context, Result};
-use cao_cli::args::{hide, setup, shape, usage};
+use cao_cli::args::{self, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_targets, check_validation, open_gpu};
 use cao_gpu::DeviceKind;
 use cao_model::methods::Method;
@@ -162,8 +162,8 @@ fn base(cli: &Cli, transfer: &str) -> Result<Configuration> {
     // A rule asks for a method that has it; other methods take their own.
     let method = cli.settings.quadrature.map_or(Method::Cao, |rule| Method::for_rule(Some(rule)));
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
-    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
-    hide(&mut volume, &transfer, &cli.input)?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range());
+    let transfer = args::transfer(transfer, &mut volume, &cli.input)?;
     let input = Rc::new(Input { name: cli.input.clone(), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }
