@@ -9,7 +9,8 @@ const MAGIC: [u8; 2] = [0x1f, 0x8b];
 fn next_bytes<F: Read + Seek>(file: &mut BufReader<F>) -> io::Result<&[u8]> {
     if file.buffer().len() < MAGIC.len() {
         // Throws away what is buffered, so that the buffer begins at the next byte.
-        file.seek(SeekFrom::Current(0))?;
+        let here = file.stream_position()?;
+        file.seek(SeekFrom::Start(here))?;
     }
     file.fill_buf()
 }

@@ -150,7 +150,7 @@ impl<'a> Header<'a> {
             let out = directions.as_ref().is_some_and(|d| d[*a].is_some()) && !in_space(*a);
             out || ["time", "list"].contains(&kind(*a).as_str())
         };
-        let declared = |a: &usize| in_space(*a) && (directions.is_some() || any(*a) && kind(*a) != "");
+        let declared = |a: &usize| in_space(*a) && (directions.is_some() || any(*a) && !kind(*a).is_empty());
         let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
         let mut series = None;
         while axes.len() > 3 {

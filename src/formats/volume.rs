@@ -1,7 +1,7 @@
 //! Volumes from files.
 //!
 //! Formats: NRRD (`.nrrd`, `.nhdr`), NIfTI-1 and -2 (`.nii`, `.nii.gz`, `.hdr` + `.img`), MetaImage (`.mha`, `.mhd`),
-//! and raw data with a description beside it ([`read_raw`]). The content decides which reader is used, the file's
+//! and raw data with a description beside it ([`read_raw`](crate::read_raw)). The content decides which reader is used, the file's
 //! extension only where a format has no signature.
 //!
 //! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header

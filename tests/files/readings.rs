@@ -274,8 +274,11 @@ fn a_frame_of_a_series_that_no_memory_holds_is_read() {
 
 // ------------------------------------------------------------------------------------------------ what follows the data
 
+/// What is made of the data.
+type Padding<'a> = &'a dyn Fn(&[u8]) -> Vec<u8>;
+
 /// Files of every format with `padded` of the data in their place; each with the file that ends too late.
-fn with_data(folder: &Folder, compressed: bool, padded: &dyn Fn(&[u8]) -> Vec<u8>) -> Vec<(String, Vec<u8>)> {
+fn with_data(folder: &Folder, compressed: bool, padded: Padding) -> Vec<(String, Vec<u8>)> {
     let data = bytes_of(&nrrd_values(), Endian::Little);
     let nifti = Nifti::new(1, &nrrd_values(), Endian::Little);
     let encoding = if compressed { "gzip" } else { "raw" };
@@ -300,7 +303,7 @@ fn with_data(folder: &Folder, compressed: bool, padded: &dyn Fn(&[u8]) -> Vec<u8
 #[test]
 fn bytes_after_the_data_are_a_warning_that_names_the_file() {
     let long = |bytes: &[u8]| [bytes, &[1, 2, 3]].concat();
-    type Case<'a> = (bool, &'a dyn Fn(&[u8]) -> Vec<u8>, &'a str);
+    type Case<'a> = (bool, Padding<'a>, &'a str);
     let cases: [Case; 5] = [
         (false, &long, "3 bytes after the"),
         (true, &|bytes| long(&gzip(bytes)), "3 bytes after the end of the compressed data"),
@@ -345,11 +348,10 @@ fn bytes_after_the_data_are_a_warning_that_names_the_file() {
 
 #[test]
 fn zeros_after_gzip_and_several_members_are_nothing_to_speak_of() {
-    let (zeros, halves): (&dyn Fn(&[u8]) -> Vec<u8>, &dyn Fn(&[u8]) -> Vec<u8>) =
-        (&|bytes| [gzip(bytes), vec![0; 100_000]].concat(), &|bytes| {
-            let (a, b) = bytes.split_at(bytes.len() / 2);
-            [gzip(a), gzip(b), vec![0; 512]].concat()
-        });
+    let (zeros, halves): (Padding, Padding) = (&|bytes| [gzip(bytes), vec![0; 100_000]].concat(), &|bytes| {
+        let (a, b) = bytes.split_at(bytes.len() / 2);
+        [gzip(a), gzip(b), vec![0; 512]].concat()
+    });
     for padded in [zeros, halves] {
         let folder = Folder::new();
         for (name, content) in with_data(&folder, true, padded) {
@@ -499,6 +501,22 @@ fn transparent_is_a_value_of_opacity_0_exactly_or_a_reason() {
                 assert_eq!(hidden.value(1), volume.value(1), "others stay");
                 assert_eq!(hidden.hide_no_numbers(&transfer).unwrap(), 0, "none is left");
             }
+            // Opacity 0 at one value only, which may not be among those that the file's type, slope and intercept reach.
+            let mut exact = 0;
+            for i in 0..200 {
+                let at = 6.0 + 0.37 * i as f32;
+                let transfer = points(&[[at - 1.0, 0.9], [at, 0.0], [at + 1.0, 0.9]]);
+                let mut hidden = volume.clone();
+                match hidden.hide_no_numbers(&transfer) {
+                    Ok(_) => exact += 1,
+                    Err(error) => {
+                        assert!(error.to_string().contains("no value of opacity 0"), "{error}");
+                        continue;
+                    }
+                }
+                assert!(holes(&hidden).iter().all(|v| transfer.opacity_at(*v as f32) == 0.0), "{at}");
+            }
+            assert!(exact > 20, "{exact}");
             for opaque in [points(&[[0.0, 0.1]]), points(&[[0.0, 0.5], [9.0, 0.0], [9.0, 0.5]])] {
                 let error = volume.clone().hide_no_numbers(&opaque).unwrap_err().to_string();
                 assert!(error.contains("no value of opacity 0 for the 6 voxels"), "{error}");

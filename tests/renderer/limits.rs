@@ -2,9 +2,11 @@
 
 use cao::{Error, Renderer};
 use cao_gpu::Gpu;
+use cao_model::look::Look;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
+use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
 use cao_testing::{close, open};
 
@@ -62,18 +64,26 @@ fn a_volume_changed_by_hand_is_checked() {
     close(gpu);
 }
 
+/// Opacity and picture are those of the largest numbers of 32 bits: infinities of both signs side by side would make none.
 #[test]
-fn values_beyond_32_bits_keep_the_opacity_that_they_have() {
+fn values_beyond_32_bits_are_the_largest_that_there_are() {
     let gpu = open();
-    let values = vec![-1e300, 0.0, f64::from(f32::MAX), 1e300];
-    let volume = Volume::new([4, 1, 1], [1.0; 3], Values::F64(values)).unwrap();
-    let mut renderer = render(&gpu, &volume).unwrap();
-    renderer.update(&mut |_| ()).unwrap();
-    let opacity = renderer.read_opacity().unwrap();
-    assert_eq!((opacity[0], opacity[1]), (0.0, 0.0));
-    for i in [2, 3] {
-        assert!((opacity[i] - 0.75).abs() < 1.0 / 65535.0, "{opacity:?}");
-    }
-    drop(renderer);
+    let most = f64::from(f32::MAX);
+    let of = |large: f64| {
+        let values = (0..216).map(|i| [-large, 0.0, large, 0.7][i * 7 % 4]).collect();
+        Volume::new([6; 3], [1.0; 3], Values::F64(values)).unwrap()
+    };
+    let shown = |volume: &Volume| {
+        let mut renderer = render(&gpu, volume).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+        let eyes = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 0.1, 100.0).unwrap();
+        let (image, _) = renderer.draw(&eyes, &Look::default(), [48, 48]).unwrap();
+        (renderer.read_opacity().unwrap(), image.colour)
+    };
+    let (opacity, picture) = shown(&of(1e300));
+    assert!(opacity.iter().any(|a| *a > 0.7) && opacity.contains(&0.0));
+    assert!(picture.iter().flatten().flatten().all(|c| c.is_finite()));
+    assert!(picture[0].iter().any(|p| p[3] > 0.5));
+    assert!((opacity, picture) == shown(&of(most)));
     close(gpu);
 }
