@@ -40,7 +40,7 @@ pub trait Ambient: Send + Sync {
     fn categories(&self, on: &Subject) -> Result<Categories> {
         let mask = self.mask(on)?;
         Ok(Categories::each(|category| {
-            mask.iter().filter(|voxel| u32::from(**voxel) == category).count() as u32
+            mask.iter().filter(|voxel| u32::from(**voxel) == category).count() as u64
         }))
     }
 }
@@ -86,16 +86,16 @@ pub struct Recomputation<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Categories {
     /// a: clipped.
-    pub clipped: u32,
+    pub clipped: u64,
     /// b: visible, neighbourhood changed.
-    pub affected: u32,
+    pub affected: u64,
     /// c: untouched.
-    pub untouched: u32,
+    pub untouched: u64,
 }
 
 impl Categories {
     /// What `of` says of each category, as the mask has it.
-    pub(crate) fn each(of: impl Fn(u32) -> u32) -> Self {
+    pub(crate) fn each(of: impl Fn(u32) -> u64) -> Self {
         Self { clipped: of(CLIPPED), affected: of(AFFECTED), untouched: of(UNTOUCHED) }
     }
 }

@@ -3,11 +3,13 @@
 use anyhow::{Context, Result};
 use cao_formats::printable;
 use cao_formats::scene::VolumeSource;
+use cao_formats::{NoNumbers, Reading};
 use cao_model::METHODS;
 use cao_model::clip::Shape;
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::settings::{Scope, Setup};
+use cao_model::transfer::TransferFunction;
 use cao_model::values::Endian;
 use cao_model::volume::Volume;
 use clap::Args;
@@ -57,6 +59,36 @@ pub struct Raw {
     /// Order of a value's bytes: little or big [default: little]
     #[arg(long, value_name = "ORDER", value_parser = endian, requires = "dims")]
     pub endian: Option<Endian>,
+    /// What the file leaves open.
+    #[command(flatten)]
+    pub choices: Choices,
+}
+
+/// What a volume file leaves open.
+#[derive(Args)]
+#[command(next_help_heading = "Reading")]
+pub struct Choices {
+    /// Which volume of a series (4D NIfTI, NRRD, MetaImage), from 0
+    #[arg(long, value_name = "N")]
+    pub frame_index: Option<u64>,
+    /// What stands for voxels that are NaN, infinite or beyond 8.5e37 (the largest numbers stand for no data in many files): a value, or
+    /// transparent, a value that the transfer function gives opacity 0
+    #[arg(long, value_name = "VALUE|transparent", value_parser = no_numbers, allow_hyphen_values = true)]
+    pub nan: Option<NoNumbers>,
+}
+
+impl Choices {
+    /// These, and where they say nothing the `other` ones.
+    pub fn or(&self, other: Reading) -> Reading {
+        Reading {
+            frame_index: self.frame_index.or(other.frame_index),
+            no_numbers: self.nan.unwrap_or(other.no_numbers),
+        }
+    }
+}
+
+fn no_numbers(text: &str) -> Result<NoNumbers, String> {
+    NoNumbers::parse(text).ok_or_else(|| "expected a number or transparent".into())
 }
 
 /// How occlusion is computed.
@@ -135,16 +167,37 @@ impl Raw {
 
     /// Opens a volume by the name that the user gave.
     pub fn open(&self, input: &OsStr) -> Result<Volume> {
-        open(&self.source(input)?, input)
+        open(&self.source(input)?, self.choices.or(Reading::default()), input)
     }
 }
 
-/// Opens a volume; errors name `input`, also where the library knows of no file.
-pub fn open(source: &VolumeSource, input: &OsStr) -> Result<Volume> {
-    match source.open() {
-        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input)),
-        other => Ok(other?),
+/// Opens a volume and prints its warnings; errors name `input`, also where the library knows of no file.
+pub fn open(source: &VolumeSource, reading: Reading, input: &OsStr) -> Result<Volume> {
+    let opened = match source.open(&reading) {
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input))?,
+        other => other?,
+    };
+    opened.warnings.iter().for_each(|warning| crate::say(&format!("warning: {warning}")));
+    Ok(opened.volume)
+}
+
+/// The transfer function of a volume, of which voxels that hold no number get a value without opacity where the user asked for that;
+/// errors name `input`, also where the library knows of no file.
+pub fn transfer(
+    loaded: cao_formats::Result<TransferFunction>,
+    volume: &mut Volume,
+    input: &OsStr,
+) -> Result<TransferFunction> {
+    let transfer = match loaded {
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input))?,
+        other => other?,
+    };
+    if volume.values.non_finite().is_some() {
+        volume
+            .hide_no_numbers(&transfer)
+            .with_context(|| format!("{}: --nan transparent", printable(input)))?;
     }
+    Ok(transfer)
 }
 
 /// An analytic shape or a mesh file.

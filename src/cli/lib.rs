@@ -7,12 +7,23 @@ pub mod output;
 pub mod targets;
 
 use cao_formats::printable;
+use cao_model::error::shown;
 use clap::{ArgMatches, Parser};
-use std::io::{ErrorKind, Write, stderr, stdout};
+use std::io::{ErrorKind, Write, stdout};
 use std::process::ExitCode;
 
 /// Exit code for a wrong command line, as clap's own.
 const USAGE: u8 = 2;
+
+/// Text for a terminal: line ends stay, whatever else commands it is escaped.
+pub fn harmless(text: &str) -> String {
+    text.split('\n').map(|line| shown(line, usize::MAX)).collect::<Vec<_>>().join("\n")
+}
+
+/// A message on standard error. Where that cannot be written to, nobody can be told.
+pub fn say(message: &str) {
+    let _ = writeln!(std::io::stderr(), "{}", harmless(message));
+}
 
 /// The command line as it was understood and as it was typed; or the exit code, for whom only help was printed or what is wrong.
 pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
@@ -22,7 +33,7 @@ pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
         if answer.use_stderr() {
             // Clap shows words as they were typed.
             match std::env::args_os().any(|word| printable(&word) != word.to_string_lossy()) {
-                true => complain(&answer.render().to_string()),
+                true => say(&answer.render().to_string()),
                 false => drop(answer.print()),
             }
             return ExitCode::from(USAGE);
@@ -31,7 +42,7 @@ pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
         match printed {
             Err(error) if error.kind() != ErrorKind::BrokenPipe => {
                 let program = C::command().get_name().to_owned();
-                complain(&format!("{program}: cannot write to standard output: {error}"));
+                say(&format!("{program}: cannot write to standard output: {error}"));
                 ExitCode::FAILURE
             }
             _ => ExitCode::SUCCESS,
@@ -42,16 +53,10 @@ pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
 /// The exit code of a program; what went wrong is printed once, after the program's name.
 pub fn end(program: &str, outcome: anyhow::Result<ExitCode>) -> ExitCode {
     outcome.unwrap_or_else(|error| {
-        complain(&format!("{program}: {error:#}"));
+        say(&format!("{program}: {error:#}"));
         match error.is::<args::Usage>() {
             true => ExitCode::from(USAGE),
             false => ExitCode::FAILURE,
         }
     })
-}
-
-/// Prints to standard error; where that fails there is nobody left to tell.
-fn complain(text: &str) {
-    let lines = text.lines().map(|line| printable(line) + "\n");
-    let _ = stderr().write_all(lines.collect::<String>().as_bytes());
 }

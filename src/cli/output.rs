@@ -30,7 +30,7 @@ impl Out {
 
     /// A line for people.
     pub fn line(&mut self, line: impl AsRef<str>) {
-        self.text.push_str(line.as_ref());
+        self.text.push_str(&crate::harmless(line.as_ref()));
         self.text.push('\n');
     }
 
@@ -97,8 +97,8 @@ impl Out {
 
     /// Voxels of each category.
     pub fn categories(&mut self, c: &Categories) {
-        let all = f64::from(c.clipped) + f64::from(c.affected) + f64::from(c.untouched);
-        let share = |n: u32| 100.0 * f64::from(n) / all.max(1.0);
+        let all = c.clipped as f64 + c.affected as f64 + c.untouched as f64;
+        let share = |n: u64| 100.0 * n as f64 / all.max(1.0);
         self.line(format!(
             "voxels    {:.2} % clipped, {:.2} % affected, {:.2} % untouched",
             share(c.clipped),

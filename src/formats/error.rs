@@ -1,5 +1,6 @@
 //! What can go wrong with a file, said so that the user knows what to do next.
 
+use cao_model::error::{MOST_NAMED, MOST_SAID, shown, shown_path};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused a file.
-    #[error("cannot access {}", printable(path))]
+    #[error("cannot access {}", shown_path(path))]
     Io {
         /// File that was read or written.
         path: PathBuf,
@@ -19,7 +20,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file's content is not what its format or its header says.
-    #[error("{}: {field}: {problem}", printable(path))]
+    #[error("{}: {}: {}", shown_path(path), shown(field, MOST_NAMED), shown(problem, MOST_SAID))]
     File {
         /// The file.
         path: PathBuf,
@@ -37,6 +38,11 @@ impl Error {
     /// The refusal of the setting `what`.
     pub(crate) fn refused(what: &str, problem: impl Into<String>) -> Self {
         cao_model::Error::refused(what, problem).into()
+    }
+
+    /// The refusal of what a file says in `field`.
+    pub(crate) fn file(path: &Path, field: &str, problem: impl Into<String>) -> Self {
+        Self::File { path: path.into(), field: field.into(), problem: problem.into() }
     }
 
     /// The same refusal of a setting that is part of `section`.
@@ -71,14 +77,7 @@ impl Error {
     }
 }
 
-/// A name as a message shows it: without what would move the cursor of a terminal or begin a line of its own.
+/// A name as a message shows it: without what would move the cursor of a terminal or begin a line of its own, and of bounded length.
 pub fn printable(name: impl AsRef<OsStr>) -> String {
-    let mut text = String::new();
-    for c in name.as_ref().to_string_lossy().chars() {
-        match c.is_control() {
-            true => text.extend(c.escape_default()),
-            false => text.push(c),
-        }
-    }
-    text
+    shown_path(Path::new(name.as_ref()))
 }

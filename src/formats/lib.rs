@@ -4,16 +4,21 @@
 #![forbid(unsafe_code)]
 
 pub mod error;
+pub mod file;
 mod grid;
+mod gzip;
 pub mod input;
+mod memory;
 mod metaimage;
 mod nifti;
 mod nrrd;
 pub mod obj;
 mod outputs;
+mod parts;
 mod payload;
 pub mod picture;
 mod raw;
+mod reading;
 pub mod scene;
 mod text;
 mod toml_value;
@@ -25,6 +30,7 @@ pub use error::{Error, Result, printable};
 pub use outputs::{Outputs, write_atomic};
 pub use picture::Picture;
 pub use raw::read_raw;
+pub use reading::{NoNumbers, Opened, Reading};
 pub use scene::Scene;
-pub use volume::{open, read};
+pub use volume::{open, read, read_as};
 pub use write::write_nrrd;

@@ -6,13 +6,15 @@
 use std::path::Path;
 
 use crate::Result;
-use crate::error::printable;
 use crate::grid::{self, Grid};
-use crate::payload::{Encoding, Part, Payload, Skip};
+use crate::parts::Parts;
+use crate::payload::{Encoding, Payload, Skip};
+use crate::reading::{Frame, Opened, Reading};
 use crate::text::{Fields, Lines, data_files, quoted};
-use crate::volume::{assemble, bad};
+use crate::volume::{Found, assemble, bad};
+use cao_model::error::shown_path;
 use cao_model::values::{Endian, Kind};
-use cao_model::volume::{IDENTITY, Volume, check_spacing, voxel_count};
+use cao_model::volume::{IDENTITY, check_spacing, voxel_count};
 
 /// Keys that are used here, and those that files begin with.
 const KEYS: [&str; 26] = [
@@ -56,29 +58,32 @@ fn known(key: &str) -> Option<&'static str> {
 }
 
 /// Reads a file with the data in it or beside it.
-pub(crate) fn read(path: &Path) -> Result<Volume> {
+pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     let header = Header::read(path)?;
     let fields = &header.fields;
     let object = fields.get("ObjectType").unwrap_or("Image");
     if !object.eq_ignore_ascii_case("Image") {
         return Err(bad(path, "ObjectType", format!("{}, expected Image", quoted(object))));
     }
-    for (name, expected) in [("NDims", 3), ("ElementNumberOfChannels", 1)] {
-        if let Some([n]) = fields.array::<u64, 1>(name, "a whole number")?
-            && n != expected
-        {
-            return Err(bad(path, name, format!("{n}, expected {expected}: a scalar volume")));
-        }
+    if let Some([n]) = fields.array::<u64, 1>("ElementNumberOfChannels", "a whole number")?
+        && n != 1
+    {
+        return Err(bad(path, "ElementNumberOfChannels", format!("{n}, expected 1: scalar volumes")));
     }
-    let dims = fields.array::<u64, 3>("DimSize", "whole numbers of voxels")?;
-    let dims = dims.ok_or_else(|| bad(path, "DimSize", "missing, expected in every header"))?;
+    let sizes = header.sizes()?;
+    let dims = [sizes[0], sizes[1], sizes[2]];
     let count = voxel_count(dims).map_err(|p| bad(path, "DimSize", p))?;
-    let grid = header.grid()?;
+    let frame = header.frame(&sizes, reading)?;
+    let grid = header.grid(sizes.len())?;
     let scale = header.scale()?;
-    let payload = header.payload(&dims, count)?;
-    let values = payload.read(path, "ElementDataFile", count)?;
-    assemble(path, dims.map(|d| d as usize), grid, values, scale)
+    let payload = header.payload(&sizes, count, frame)?;
+    let mut warnings = Vec::new();
+    let values = payload.read(path, "ElementDataFile", count, &mut warnings)?;
+    assemble(path, Found { dims: dims.map(|d| d as usize), grid, values, scale, warnings }, reading)
 }
+
+/// Most axes of an image in ITK's reader.
+const MAX_AXES: u64 = 10;
 
 struct Header<'a> {
     fields: Fields<'a>,
@@ -129,10 +134,37 @@ impl<'a> Header<'a> {
         }
     }
 
-    fn grid(&self) -> Result<Grid> {
+    /// Voxels along every axis, of which there are three or more.
+    fn sizes(&self) -> Result<Vec<u64>> {
         let (path, fields) = (self.path(), &self.fields);
+        let [axes] = fields.array::<u64, 1>("NDims", "a whole number")?.unwrap_or([3]);
+        if !(3..=MAX_AXES).contains(&axes) {
+            return Err(bad(path, "NDims", format!("{axes}, expected 3: a volume (or 4: a series of them)")));
+        }
+        let sizes = fields.list("DimSize", axes as usize, "whole numbers of voxels")?;
+        sizes.ok_or_else(|| bad(path, "DimSize", "missing, expected in every header"))
+    }
+
+    /// Which volume along the one further axis that has more than one sample.
+    fn frame(&self, sizes: &[u64], reading: &Reading) -> Result<Frame> {
+        let further: Vec<u64> = sizes[3..].iter().copied().filter(|n| *n != 1).collect();
+        let count = match further[..] {
+            [] => 1,
+            [n] => n,
+            _ => {
+                let problem = format!("{sizes:?}, expected at most one axis beyond those of space");
+                return Err(bad(self.path(), "DimSize", problem));
+            }
+        };
+        Frame::choose(reading, count, false).map_err(|p| bad(self.path(), "DimSize", p))
+    }
+
+    /// The grid of the first three of these axes.
+    fn grid(&self, axes: usize) -> Result<Grid> {
+        let (path, fields) = (self.path(), &self.fields);
+        let spatial = |list: Vec<f64>| -> [f64; 3] { std::array::from_fn(|i| list[i]) };
         let field = self.first_of(["ElementSpacing", "ElementSize"]).unwrap_or("ElementSpacing");
-        let spacing = fields.array(field, "numbers")?.unwrap_or([1.0; 3]);
+        let spacing = fields.list(field, axes, "numbers")?.map_or([1.0; 3], spatial);
         let unit = match fields.get("DistanceUnits") {
             None | Some("?" | "") => 1.0,
             Some(name) => grid::millimetres(name).ok_or_else(|| {
@@ -142,7 +174,7 @@ impl<'a> Header<'a> {
         let mut grid = Grid::plain(spacing);
         let origin = self.first_of(["Offset", "Position", "Origin"]);
         if let Some(name) = origin {
-            grid.origin = fields.array(name, "numbers")?.unwrap_or_default();
+            grid.origin = fields.list(name, axes, "numbers")?.map_or([0.0; 3], spatial);
             if grid.origin.iter().any(|x: &f64| !x.is_finite()) {
                 return Err(bad(path, name, "not finite, expected a position"));
             }
@@ -150,8 +182,14 @@ impl<'a> Header<'a> {
         let matrix = self.first_of(["TransformMatrix", "Rotation", "Orientation"]);
         if let Some(name) = matrix {
             // Row a is the direction of index axis a, as ITK writes it.
-            let m: [f64; 9] = fields.array(name, "numbers")?.unwrap_or_default();
-            let rows = [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]]];
+            let m: Vec<f64> = fields.list(name, axes * axes, "numbers")?.unwrap_or_default();
+            let row = |a: usize| &m[a * axes..(a + 1) * axes];
+            let mixed = (0..axes).any(|a| (0..axes).any(|b| (a < 3) != (b < 3) && row(a)[b] != 0.0));
+            if mixed {
+                let problem = "an axis of space leads into the series, expected the axes of space apart from the others";
+                return Err(bad(path, name, problem));
+            }
+            let rows = [0, 1, 2].map(|a| std::array::from_fn(|b| row(a)[b]));
             grid.directions =
                 if rows == IDENTITY { IDENTITY } else { grid::axes(rows).map_err(|p| bad(path, name, p))?.1 };
         }
@@ -175,7 +213,7 @@ impl<'a> Header<'a> {
         ))
     }
 
-    fn payload(&self, dims: &[u64; 3], count: usize) -> Result<Payload> {
+    fn payload(&self, sizes: &[u64], count: usize, frame: Frame) -> Result<Payload> {
         let (path, fields) = (self.path(), &self.fields);
         let name = fields.require("ElementType")?;
         let kind = kind(name).ok_or_else(|| {
@@ -202,9 +240,9 @@ impl<'a> Header<'a> {
         let data_file = fields.require("ElementDataFile")?;
         let local = data_file.eq_ignore_ascii_case("LOCAL");
         let mut parts = if local {
-            vec![Part { path: path.into(), start: self.end }]
+            Parts::one(path.into(), self.end)
         } else {
-            data_files(path, "ElementDataFile", data_file, &self.list, dims)?
+            data_files(path, "ElementDataFile", data_file, &self.list, sizes)?
         };
         let [header_size] = fields.array::<i64, 1>("HeaderSize", "a number of bytes, or -1")?.unwrap_or([0]);
         let mut skip = Skip::NOTHING;
@@ -212,7 +250,7 @@ impl<'a> Header<'a> {
             0 => {}
             -1 if encoding == Encoding::Raw => skip = Skip::AllButLast,
             // Counted from the start of the file, as MetaIO does, also when header and data share it.
-            1.. => parts.iter_mut().for_each(|p| p.start = header_size as u64),
+            1.. => parts.start = header_size as u64,
             _ => {
                 let problem =
                     format!("{header_size}, expected 0 or more, or -1 for data that are not compressed");
@@ -221,17 +259,16 @@ impl<'a> Header<'a> {
         }
         let size = fields.array::<u64, 1>("CompressedDataSize", "a number of bytes")?;
         // A size of 0 is what writers leave that did not know it.
-        if let (Encoding::Deflate, Some([size]), [part]) = (encoding, size, parts.as_slice())
-            && size > 0
-            && let Ok(meta) = std::fs::metadata(&part.path)
-            && meta.len().saturating_sub(part.start) != size
+        if let (Encoding::Deflate, Some([size]), 1) = (encoding, size, parts.len())
+            && let Ok(meta) = std::fs::metadata(parts.path(0))
+            && meta.len().saturating_sub(parts.start) < size
         {
-            let have = meta.len().saturating_sub(part.start);
+            let have = meta.len().saturating_sub(parts.start);
             let problem =
-                format!("{size} bytes, but {} holds {have} for {count} values", printable(&part.path));
+                format!("{size} bytes, but {} holds {have} for {count} values", shown_path(&parts.path(0)));
             return Err(bad(path, "CompressedDataSize", problem));
         }
-        Ok(Payload { kind, endian, encoding, skip, parts })
+        Ok(Payload { kind, endian, encoding, skip, parts, frame, exact: false })
     }
 }
 

@@ -7,12 +7,14 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::grid::{self, Grid};
-use crate::input;
-use crate::payload::{Encoding, Part, Payload, Skip};
-use crate::volume::{assemble, bad};
-use crate::{Error, Result};
+use crate::parts::Parts;
+use crate::payload::{Encoding, Payload, Skip};
+use crate::reading::{Frame, Opened, Reading};
+use crate::volume::{Found, assemble, bad};
+use crate::{Error, Result, file};
+use cao_model::error::quoted;
 use cao_model::values::{Endian, Kind};
-use cao_model::volume::{Space, Volume, check_spacing, voxel_count};
+use cao_model::volume::{Space, check_spacing, voxel_count};
 
 const HEADER_1: usize = 348;
 const HEADER_2: usize = 540;
@@ -31,7 +33,7 @@ pub(crate) fn is_nifti(head: &[u8]) -> bool {
 }
 
 /// Reads a file, or the pair when either of its files is named.
-pub(crate) fn read(path: &Path) -> Result<Volume> {
+pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     let named_image = ["img", "img.gz"].iter().any(|end| has_extension(path, end));
     let header_path = if named_image { partner(path, "hdr") } else { path.to_path_buf() };
     let path = header_path.as_path();
@@ -41,9 +43,10 @@ pub(crate) fn read(path: &Path) -> Result<Volume> {
     let count = voxel_count(dims).map_err(|p| bad(path, "dim", p))?;
     let grid = header.grid()?;
     let scale = header.scale()?;
-    let payload = header.payload(compressed)?;
-    let values = payload.read(path, "data", count)?;
-    assemble(path, dims.map(|d| d as usize), grid, values, scale)
+    let payload = header.payload(compressed, header.frame(reading)?)?;
+    let mut warnings = Vec::new();
+    let values = payload.read(path, "data", count, &mut warnings)?;
+    assemble(path, Found { dims: dims.map(|d| d as usize), grid, values, scale, warnings }, reading)
 }
 
 fn has_extension(path: &Path, extension: &str) -> bool {
@@ -51,18 +54,26 @@ fn has_extension(path: &Path, extension: &str) -> bool {
     name.ends_with(&format!(".{extension}"))
 }
 
-/// The other file of a pair: with this extension, or with it and `.gz` when only that one is there.
+/// The other file of a pair: with this extension in small letters, capitals or a capital, or with it and `.gz` when only that one is
+/// there.
 fn partner(path: &Path, extension: &str) -> PathBuf {
     let stem = if has_extension(path, "gz") { path.with_extension("") } else { path.to_path_buf() };
-    let plain = stem.with_extension(extension);
-    let compressed = stem.with_extension(format!("{extension}.gz"));
-    if !plain.exists() && compressed.exists() { compressed } else { plain }
+    let capitals = extension.to_uppercase();
+    let capital = format!("{}{}", &capitals[..1], &extension[1..]);
+    let (small, zipped) = (extension.to_owned(), format!("{extension}.gz"));
+    let spelt =
+        [small, capitals.clone(), capital, zipped, format!("{capitals}.GZ"), format!("{capitals}.gz")];
+    let mut found = spelt.iter().map(|extension| stem.with_extension(extension));
+    // What is missing is called as its partner is.
+    let capitals = stem.extension().is_some_and(|e| e.to_string_lossy().chars().all(char::is_uppercase));
+    let missing = || stem.with_extension(&spelt[usize::from(capitals)]);
+    found.find(|path| path.exists()).unwrap_or_else(missing)
 }
 
 /// The first bytes after decompression, and whether there was any.
 fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
-    let io = |source| Error::Io { path: path.into(), source };
-    let mut file = input::open(path).map_err(io)?;
+    let io = Error::io(path);
+    let (mut file, _) = file::open(path).map_err(io)?;
     let mut magic = Vec::new();
     file.by_ref().take(2).read_to_end(&mut magic).map_err(io)?;
     let compressed = magic == GZIP;
@@ -115,9 +126,9 @@ impl<'a> Header<'a> {
             [b'n', b'+', v, 0] if *v == version => false,
             [b'n', b'i', v, 0] if *v == version => true,
             _ => {
-                let found = String::from_utf8_lossy(magic).into_owned();
+                let found = String::from_utf8_lossy(magic);
                 let expected = if second { "n+2 or ni2" } else { "n+1 or ni1 (ANALYZE files have none)" };
-                return Err(bad(path, "magic", format!("{found:?}, expected {expected}")));
+                return Err(bad(path, "magic", format!("{}, expected {expected}", quoted(&found))));
             }
         };
         Ok(Header { path, bytes, endian, second, pair })
@@ -149,21 +160,24 @@ impl<'a> Header<'a> {
         }
     }
 
+    /// Entry `i` of `dim`, of which the first is their number.
+    fn dim(&self, i: usize) -> i64 {
+        if self.second { i64::from_le_bytes(self.at(16 + 8 * i)) } else { self.i16(40 + 2 * i) }
+    }
+
     fn dims(&self) -> Result<[u64; 3]> {
-        let dim = |i: usize| {
-            if self.second { i64::from_le_bytes(self.at(16 + 8 * i)) } else { self.i16(40 + 2 * i) }
-        };
+        let dim = |i: usize| self.dim(i);
         let rank = dim(0);
         if !(3..=7).contains(&rank) {
             return Err(bad(
                 self.path,
                 "dim[0]",
-                format!("{rank} dimensions, expected 3 (or 4 with dim[4] = 1)"),
+                format!("{rank} dimensions, expected 3, or 4 for a series"),
             ));
         }
         // 0 stands for an unused dimension in many files.
-        if let Some(i) = (4..=rank as usize).find(|i| !(0..=1).contains(&dim(*i))) {
-            let problem = format!("{}, expected 1: one scalar volume, no series and no vectors", dim(i));
+        if let Some(i) = (5..=rank as usize).find(|i| !(0..=1).contains(&dim(*i))) {
+            let problem = format!("{}, expected 1: scalar volumes, no vectors", dim(i));
             return Err(bad(self.path, &format!("dim[{i}]"), problem));
         }
         let [x, y, z] = [1, 2, 3].map(|i| u64::try_from(dim(i)).map_err(|_| i));
@@ -173,6 +187,12 @@ impl<'a> Header<'a> {
                 Err(bad(self.path, &format!("dim[{i}]"), format!("{}, expected 1 or more", dim(i))))
             }
         }
+    }
+
+    /// Which volume of the fourth dimension.
+    fn frame(&self, reading: &Reading) -> Result<Frame> {
+        let count = if self.dim(0) > 3 { self.dim(4).max(1) } else { 1 };
+        Frame::choose(reading, count as u64, false).map_err(|p| bad(self.path, "dim[4]", p))
     }
 
     fn grid(&self) -> Result<Grid> {
@@ -264,7 +284,7 @@ impl<'a> Header<'a> {
         Ok((slope, intercept))
     }
 
-    fn payload(&self, compressed: bool) -> Result<Payload> {
+    fn payload(&self, compressed: bool, frame: Frame) -> Result<Payload> {
         let path = self.path;
         let code = self.i16(if self.second { 12 } else { 70 });
         let kind = match code {
@@ -314,6 +334,7 @@ impl<'a> Header<'a> {
         } else {
             (Encoding::Raw, Skip::NOTHING, offset)
         };
-        Ok(Payload { kind, endian: self.endian, encoding, skip, parts: vec![Part { path: data, start }] })
+        let parts = Parts::one(data, start);
+        Ok(Payload { kind, endian: self.endian, encoding, skip, parts, frame, exact: false })
     }
 }

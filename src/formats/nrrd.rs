@@ -7,11 +7,13 @@ use std::path::Path;
 
 use crate::Result;
 use crate::grid::{self, Grid};
-use crate::payload::{Encoding, Part, Payload, Skip};
+use crate::parts::Parts;
+use crate::payload::{Encoding, Payload, Skip};
+use crate::reading::{Frame, Opened, Reading};
 use crate::text::{Fields, Lines, data_files, quoted};
-use crate::volume::{assemble, bad};
+use crate::volume::{Found, assemble, bad};
 use cao_model::values::{Endian, Kind};
-use cao_model::volume::{Volume, check_spacing, voxel_count};
+use cao_model::volume::{check_spacing, voxel_count};
 
 /// All fields of the format. White space and case do not matter in a field's name.
 const FIELDS: [&str; 28] = [
@@ -53,16 +55,27 @@ pub(crate) fn is_nrrd(head: &[u8]) -> bool {
 }
 
 /// Reads a file with attached or detached data.
-pub(crate) fn read(path: &Path) -> Result<Volume> {
+pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     let header = Header::read(path)?;
-    let axes = header.spatial_axes()?;
+    let (axes, frame) = header.axes(reading)?;
     let dims = axes.map(|a| header.sizes[a]);
     let count = voxel_count(dims).map_err(|p| bad(path, "sizes", p))?;
     let grid = header.grid(axes)?;
-    let payload = header.payload()?;
-    let values = payload.read(path, "data file", count)?;
-    assemble(path, dims.map(|d| d as usize), grid, values, (1.0, 0.0))
+    let payload = header.payload(frame)?;
+    let mut warnings = Vec::new();
+    let values = payload.read(path, "data file", count, &mut warnings)?;
+    let found = Found { dims: dims.map(|d| d as usize), grid, values, scale: (1.0, 0.0), warnings };
+    assemble(path, found, reading)
 }
+
+/// A space: how many axes it has, and the signs that turn it into RAS; none where it has no anatomical meaning.
+struct World {
+    axes: usize,
+    flip: Option<[f64; 3]>,
+}
+
+/// The most axes that teem reads.
+const MAX_AXES: usize = 16;
 
 struct Header<'a> {
     fields: Fields<'a>,
@@ -106,6 +119,9 @@ impl<'a> Header<'a> {
         let sizes: Vec<u64> = sizes.ok_or_else(|| bad(path, "sizes", "missing, expected in every header"))?;
         let header = Header { fields, sizes, list, end: lines.position() };
         header.fields.require("dimension")?;
+        if dimension[0] > MAX_AXES {
+            return Err(bad(path, "dimension", format!("{}, expected 3 (or 4: a series)", dimension[0])));
+        }
         if header.sizes.len() != dimension[0] {
             let problem =
                 format!("{} numbers, expected {} as `dimension` says", header.sizes.len(), dimension[0]);
@@ -118,45 +134,74 @@ impl<'a> Header<'a> {
         self.fields.path
     }
 
-    /// Which three axes are those of space: all, or all but one of a single sample.
-    fn spatial_axes(&self) -> Result<[usize; 3]> {
+    /// Which three axes are those of space, and which volume of a series. Beyond three, the axis of a series is what is called time or
+    /// list, else the last one; axes of one sample do not count.
+    fn axes(&self, reading: &Reading) -> Result<([usize; 3], Frame)> {
         let directions = self.directions()?;
         let kinds: Vec<String> = self.fields.get("kinds").map(words).unwrap_or_default();
-        let spatial = |a: usize| {
-            let no_vector = directions.as_ref().is_some_and(|d| d[a].is_none());
-            let kind = kinds.get(a).map_or(String::new(), |k| k.to_lowercase());
-            !no_vector && ["", "domain", "space", "none", "???"].contains(&kind.as_str())
+        let kind = |a: usize| kinds.get(a).map_or(String::new(), |k| k.to_lowercase());
+        let in_space =
+            |a: usize| directions.as_ref().is_none_or(|d| d[a].as_ref().is_some_and(|v| v[..3] != [0.0; 3]));
+        let any = |a: usize| ["", "domain", "space", "none", "???"].contains(&kind(a).as_str());
+        let spatial = |a: usize| any(a) && in_space(a);
+        let single = |a: &usize| self.sizes[*a] == 1;
+        // By its name, or by a vector that leads out of space.
+        let timely = |a: &usize| {
+            let out = directions.as_ref().is_some_and(|d| d[*a].is_some()) && !in_space(*a);
+            out || ["time", "list"].contains(&kind(*a).as_str())
         };
+        let declared = |a: &usize| in_space(*a) && (directions.is_some() || any(*a) && !kind(*a).is_empty());
         let mut axes: Vec<usize> = (0..self.sizes.len()).collect();
-        if axes.len() == 4 {
-            // The one that says it is not spatial, else the slowest.
-            let single = |a: &usize| self.sizes[*a] == 1;
-            let drop = axes.iter().copied().find(|a| single(a) && !spatial(*a));
-            if let Some(drop) = drop.or_else(|| axes.iter().copied().rev().find(single)) {
-                axes.remove(drop);
+        let mut series = None;
+        while axes.len() > 3 {
+            let last = axes.len() - 1;
+            if let Some(at) = axes.iter().position(|a| single(a) && !spatial(*a)) {
+                axes.remove(at);
+            } else if let (None, Some(at)) = (series, axes.iter().position(timely)) {
+                series = Some(axes.remove(at));
+            } else if single(&axes[last]) {
+                axes.pop();
+            } else if series.is_none() && axes.iter().all(declared) {
+                series = axes.pop();
+            } else if let Some(at) = axes.iter().rposition(single) {
+                axes.remove(at);
+            } else if series.is_none() && any(axes[last]) {
+                series = axes.pop();
+            } else {
+                break;
             }
         }
         let Ok(axes) = <[usize; 3]>::try_from(axes) else {
             let problem = format!(
-                "{} axes of sizes {:?}, expected a scalar volume of 3 (or 4 when one is of size 1)",
+                "{} axes of sizes {:?}, expected a scalar volume of 3 (or 4: a series of them)",
                 self.sizes.len(),
                 self.sizes
             );
             return Err(bad(self.path(), "dimension", problem));
         };
         if let Some(a) = axes.into_iter().find(|a| !spatial(*a)) {
-            let field = if directions.is_some_and(|d| d[a].is_none()) { "space directions" } else { "kinds" };
+            let field = if in_space(a) { "kinds" } else { "space directions" };
             let problem =
                 format!("axis {a} is not an axis of space (vectors or a list?), expected three that are");
             return Err(bad(self.path(), field, problem));
         }
-        Ok(axes)
+        let axis = series.unwrap_or(self.sizes.len());
+        let alone = |axes: &[u64]| axes.iter().all(|n| *n == 1);
+        let (first, last) =
+            (alone(&self.sizes[..axis]), alone(self.sizes.get(axis + 1..).unwrap_or_default()));
+        if !first && !last {
+            let problem = format!("axis {axis} is that of a series, expected it to be the first or the last");
+            return Err(bad(self.path(), "kinds", problem));
+        }
+        let count = self.sizes.get(axis).copied().unwrap_or(1);
+        let frame = Frame::choose(reading, count, !last).map_err(|p| bad(self.path(), "sizes", p))?;
+        Ok((axes, frame))
     }
 
     fn grid(&self, axes: [usize; 3]) -> Result<Grid> {
         let (path, fields) = (self.path(), &self.fields);
-        let flip = self.space()?;
-        let units = self.lengths_of_units("space units", 3)?;
+        let world = self.space()?;
+        let units = self.lengths_of_units("space units", world.axes)?;
         let mut field = "spacings";
         let mut grid = match self.directions()? {
             Some(directions) => {
@@ -168,9 +213,15 @@ impl<'a> Header<'a> {
                         "given beside `space directions`, expected one of both",
                     ));
                 }
-                // `spatial_axes` made sure that these have vectors.
-                let vectors = axes.map(|a| directions[a].unwrap_or_default());
-                let vectors = vectors.map(|v| std::array::from_fn(|i| v[i] * units[i]));
+                // `axes` made sure that these have vectors.
+                let vectors = axes.map(|a| directions[a].clone().unwrap_or_default());
+                if let Some(i) = (0..3).find(|i| vectors[*i].iter().skip(3).any(|x| *x != 0.0)) {
+                    let problem =
+                        format!("axis {} leads into the series, expected an axis of space", axes[i]);
+                    return Err(bad(path, field, problem));
+                }
+                let vectors =
+                    vectors.map(|v| std::array::from_fn(|i| v.get(i).map_or(0.0, |x| x * units[i])));
                 let (spacing, directions) = grid::axes(vectors).map_err(|p| bad(path, field, p))?;
                 Grid { directions, ..Grid::plain(spacing) }
             }
@@ -178,37 +229,48 @@ impl<'a> Header<'a> {
         };
         check_spacing(grid.spacing).map_err(|p| bad(path, field, p))?;
         if let Some(text) = fields.get("space origin").filter(|t| *t != "none") {
-            let origin = vectors(text).filter(|v| v.len() == 1).and_then(|v| v[0]);
+            let origin = vectors(text, world.axes).filter(|v| v.len() == 1).and_then(|mut v| v.remove(0));
             let origin = origin.filter(|o| o.iter().all(|x| x.is_finite()));
             let origin = origin.ok_or_else(|| {
                 bad(path, "space origin", format!("{}, expected (x,y,z) of finite numbers", quoted(text)))
             })?;
             grid.origin = std::array::from_fn(|i| origin[i] * units[i]);
         }
-        Ok(match flip {
+        Ok(match world.flip {
             Some(flip) => grid.flipped(flip),
             None => grid,
         })
     }
 
-    /// Signs that turn the named space into RAS; `None` for a space without anatomical meaning.
-    fn space(&self) -> Result<Option<[f64; 3]>> {
-        if let Some([n]) = self.fields.array::<u64, 1>("space dimension", "3")?
-            && n != 3
-        {
-            return Err(bad(self.path(), "space dimension", format!("{n}, expected 3")));
+    /// The space that is named, else of so many dimensions. One with time has a fourth, which only a series may have.
+    fn space(&self) -> Result<World> {
+        let most = self.sizes.len().max(3);
+        if let Some([n]) = self.fields.array::<usize, 1>("space dimension", "3")? {
+            if !(3..=most).contains(&n) {
+                return Err(bad(self.path(), "space dimension", format!("{n}, expected 3")));
+            }
+            return Ok(World { axes: n, flip: None });
         }
-        let Some(space) = self.fields.get("space") else { return Ok(None) };
-        Ok(match space.to_lowercase().as_str() {
+        let Some(space) = self.fields.get("space") else { return Ok(World { axes: 3, flip: None }) };
+        let name = space.to_lowercase();
+        let (axes, name) = match name.strip_suffix("-time").or(match name.as_str() {
+            "rast" | "last" | "lpst" => name.strip_suffix('t'),
+            _ => None,
+        }) {
+            Some(name) if most > 3 => (4, name),
+            _ => (3, name.as_str()),
+        };
+        let flip = match name {
             "right-anterior-superior" | "ras" => Some([1.0, 1.0, 1.0]),
             "left-anterior-superior" | "las" => Some([-1.0, 1.0, 1.0]),
             "left-posterior-superior" | "lps" => Some([-1.0, -1.0, 1.0]),
             "scanner-xyz" | "3d-right-handed" | "3d-left-handed" => None,
             _ => {
-                let expected = "RAS, LAS, LPS, scanner-xyz, 3D-right-handed or 3D-left-handed";
+                let expected = "RAS, LAS, LPS, scanner-xyz, 3D-right-handed or 3D-left-handed (and for a series one with time)";
                 return Err(bad(self.path(), "space", format!("{}, expected {expected}", quoted(space))));
             }
-        })
+        };
+        Ok(World { axes, flip })
     }
 
     /// Spacings in mm: as given, from the axes' ends, or 1.
@@ -254,10 +316,10 @@ impl<'a> Header<'a> {
     }
 
     /// One vector an axis, `None` where the header has `none`.
-    fn directions(&self) -> Result<Option<Vec<Option<[f64; 3]>>>> {
+    fn directions(&self) -> Result<Option<Vec<Option<Vec<f64>>>>> {
         let Some(text) = self.fields.get("space directions") else { return Ok(None) };
         let dimension = self.sizes.len();
-        match vectors(text) {
+        match vectors(text, self.space()?.axes) {
             Some(vectors) if vectors.len() == dimension => Ok(Some(vectors)),
             _ => {
                 let problem = format!("{}, expected (x,y,z) or none, {dimension} times", quoted(text));
@@ -266,7 +328,7 @@ impl<'a> Header<'a> {
         }
     }
 
-    fn payload(&self) -> Result<Payload> {
+    fn payload(&self, frame: Frame) -> Result<Payload> {
         let (path, fields) = (self.path(), &self.fields);
         let kind = fields.require("type")?;
         let kind = Kind::parse(kind)
@@ -311,9 +373,9 @@ impl<'a> Header<'a> {
         };
         let parts = match fields.get("data file") {
             Some(value) => data_files(path, "data file", value, &self.list, &self.sizes)?,
-            None => vec![Part { path: path.into(), start: self.end }],
+            None => Parts::one(path.into(), self.end),
         };
-        Ok(Payload { kind, endian, encoding, skip, parts })
+        Ok(Payload { kind, endian, encoding, skip, parts, frame, exact: false })
     }
 }
 
@@ -340,8 +402,8 @@ fn words(text: &str) -> Vec<String> {
     text.split_whitespace().map(str::to_string).collect()
 }
 
-/// `(x,y,z) none (x,y,z) …`; `None` when it is anything else.
-fn vectors(text: &str) -> Option<Vec<Option<[f64; 3]>>> {
+/// `(x,y,z) none (x,y,z) …`, vectors of a space with so many axes; `None` when it is anything else.
+fn vectors(text: &str, axes: usize) -> Option<Vec<Option<Vec<f64>>>> {
     let mut vectors = Vec::new();
     let mut rest = text.trim();
     while !rest.is_empty() {
@@ -352,7 +414,7 @@ fn vectors(text: &str) -> Option<Vec<Option<[f64; 3]>>> {
         }
         let (vector, after) = rest.strip_prefix('(')?.split_once(')')?;
         let numbers: Option<Vec<f64>> = vector.split(',').map(|n| n.trim().parse().ok()).collect();
-        vectors.push(Some(numbers?.try_into().ok()?));
+        vectors.push(Some(numbers.filter(|n| n.len() == axes)?));
         rest = after.trim_start();
     }
     Some(vectors)

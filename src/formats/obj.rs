@@ -1,28 +1,32 @@
 //! Wavefront OBJ: the triangles of clip meshes.
 
 use crate::error::printable;
-use crate::{Error, Result, input};
+use crate::{Result, file};
+use cao_model::error::quoted;
 use cao_model::mesh::TriangleMesh;
 use glam::Vec3;
 use std::io::Cursor;
 use std::path::Path;
 
+/// Longest file that is read: some five million triangles.
+const MAX_BYTES: u64 = 256 << 20;
+
 /// Reads a Wavefront OBJ file: all objects of the file as one mesh. Faces with more than three corners become
 /// triangle fans; points, lines, normals, texture coordinates, colours and materials are ignored.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read, [`cao_model::Error::Mesh`] naming the file (and the line where there is one)
+/// [`Error::Io`](crate::Error::Io) when the file cannot be read, [`Error::File`](crate::Error::File) when it is longer than 256 MiB, [`cao_model::Error::Mesh`] naming the file (and the line where there is one)
 /// when it is not an OBJ file, has no faces, or has coordinates that are not finite.
 pub fn load(path: &Path) -> Result<TriangleMesh> {
     let name = printable(path);
-    let bytes = input::read(path).map_err(Error::io(path))?;
+    let bytes = file::read_bytes(path, MAX_BYTES)?;
     parse(name, &String::from_utf8_lossy(&bytes))
 }
 
 /// As [`load`], from the text of an OBJ file; `name` stands for the file in errors.
 ///
 /// # Errors
-/// As [`load`], without [`Error::Io`].
+/// As [`load`], without those of the file.
 pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
     let name = name.into();
     let geometry = geometry_lines(text);
@@ -46,9 +50,8 @@ pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
             // tobj reads line by line and stops in the one it cannot read.
             let consumed = &geometry.as_bytes()[..reader.position() as usize];
             let line = consumed.iter().filter(|&&b| b == b'\n').count();
-            let found: String =
-                text.lines().nth(line.saturating_sub(1)).unwrap_or("").chars().take(60).collect();
-            let problem = format!("line {line}: {error}: \"{found}\"");
+            let found = text.lines().nth(line.saturating_sub(1)).unwrap_or("");
+            let problem = format!("line {line}: {error}: {}", quoted(found));
             return Err(cao_model::Error::Mesh { name, problem }.into());
         }
     };

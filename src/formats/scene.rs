@@ -8,6 +8,7 @@
 //! let scene = cao_formats::Scene::from_toml(
 //!     r##"
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
+//!     ## volume = { file = "fmri.nii.gz", frame_index = 7, nan = "transparent" }  # one of a series, from 0; or a value for NaN
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
@@ -65,10 +66,11 @@ use glam::Vec3;
 use serde::Deserialize;
 use toml::Value;
 
-use crate::error::printable;
+use crate::reading::{NoNumbers, Reading};
 use crate::toml_value::{in_line, number, parse_colour, shown};
-use crate::{Error, Result, input, obj, transfer};
+use crate::{Error, Result, file, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::error::{quoted, shown_path};
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -84,6 +86,8 @@ pub const MAX_IMAGE: u32 = 16384;
 pub struct Scene {
     /// Where the volume comes from.
     pub volume: VolumeSource,
+    /// How to read it where the file leaves a choice.
+    pub reading: Reading,
     /// Where opacity and colour come from; see [`Scene::transfer`].
     pub transfer: TransferSource,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are closed and face outward.
@@ -286,6 +290,7 @@ impl Scene {
     pub fn default_for(volume: VolumeSource) -> Self {
         Self {
             volume,
+            reading: Reading::default(),
             transfer: TransferSource::Preset("auto".into()),
             clips: Vec::new(),
             occlusion: OcclusionSettings::default(),
@@ -302,7 +307,7 @@ impl Scene {
     /// errors of [`obj::load`], [`TriangleMesh::outward`](cao_model::mesh::TriangleMesh::outward) and [`transfer::load`] for files it
     /// names.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = input::read_to_string(path).map_err(Error::io(path))?;
+        let text = file::read_text(path)?;
         Self::from_toml(&text, path.parent().unwrap_or(Path::new("."))).map_err(|error| error.in_file(path))
     }
 
@@ -321,8 +326,10 @@ impl Scene {
         }
         let clips = file.clip.into_iter().enumerate();
         let step_mm = file.image.step_mm.map(|mm| mm as f32);
+        let (volume, reading) = volume(file.volume, base)?;
         Ok(Self {
-            volume: volume(file.volume, base)?,
+            volume,
+            reading,
             transfer: file
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
@@ -366,6 +373,14 @@ struct SceneFile {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct NamedFile {
+    file: PathBuf,
+    frame_index: Option<u64>,
+    nan: Option<Value>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RawFile {
     raw: PathBuf,
     dims: [usize; 3],
@@ -375,6 +390,7 @@ struct RawFile {
     spacing_mm: [f64; 3],
     #[serde(default)]
     endian: EndianFile,
+    nan: Option<Value>,
 }
 
 fn unit_spacing() -> [f64; 3] {
@@ -445,12 +461,22 @@ struct ShadingFile {
     jitter: Option<bool>,
 }
 
-fn volume(value: Value, base: &Path) -> Result<VolumeSource> {
+fn volume(value: Value, base: &Path) -> Result<(VolumeSource, Reading)> {
     match value {
         Value::String(spec) => match VolumeSource::parse(&spec) {
-            VolumeSource::File(path) => Ok(VolumeSource::File(existing("volume", base, &path)?)),
-            other => Ok(other),
+            VolumeSource::File(path) => {
+                Ok((VolumeSource::File(existing("volume", base, &path)?), Reading::default()))
+            }
+            other => Ok((other, Reading::default())),
         },
+        Value::Table(table) if table.contains_key("file") => {
+            let named: NamedFile = table
+                .try_into()
+                .map_err(|error: toml::de::Error| Error::refused("volume", error.message()))?;
+            let reading =
+                Reading { frame_index: named.frame_index, no_numbers: no_numbers(named.nan.as_ref())? };
+            Ok((VolumeSource::File(existing("volume.file", base, &named.file)?), reading))
+        }
         Value::Table(table) => {
             let raw: RawFile = table
                 .try_into()
@@ -464,22 +490,36 @@ fn volume(value: Value, base: &Path) -> Result<VolumeSource> {
                     format!("{:?}: expected at least 1 voxel along each axis", raw.dims),
                 ));
             }
-            Ok(VolumeSource::Raw {
+            let reading = Reading { no_numbers: no_numbers(raw.nan.as_ref())?, ..Reading::default() };
+            let source = VolumeSource::Raw {
                 path: existing("volume.raw", base, &raw.raw)?,
                 dims: raw.dims,
                 kind: raw.kind,
                 spacing_mm: raw.spacing_mm,
                 big_endian: raw.endian == EndianFile::Big,
-            })
+            };
+            Ok((source, reading))
         }
         other => {
             let problem = format!(
-                "{}: expected a file, builtin:NAME:SIZE, or a table with raw, dims, type",
+                "{}: expected a file, builtin:NAME:SIZE, or a table with file, or with raw, dims, type",
                 shown(&other)
             );
             Err(Error::refused("volume", problem))
         }
     }
+}
+
+/// A number, or "transparent".
+fn no_numbers(value: Option<&Value>) -> Result<NoNumbers> {
+    let Some(value) = value else { return Ok(NoNumbers::Refuse) };
+    let given = match value {
+        Value::String(text) if text == "transparent" => Some(NoNumbers::Transparent),
+        other => number(other).filter(|v| v.is_finite()).map(NoNumbers::Value),
+    };
+    given.ok_or_else(|| {
+        Error::refused("volume.nan", format!("{}: expected a number or \"transparent\"", shown(value)))
+    })
 }
 
 fn transfer_source(value: Value, base: &Path) -> Result<TransferSource> {
@@ -563,7 +603,10 @@ impl OcclusionFile {
             Some("needed") => Scope::Needed,
             Some("all") => Scope::All,
             Some(other) => {
-                return Err(Error::refused("occlusion.scope", format!("{other:?}: expected needed or all")));
+                return Err(Error::refused(
+                    "occlusion.scope",
+                    format!("{}: expected needed or all", quoted(other)),
+                ));
             }
         };
         for (key, value, zero) in [
@@ -724,7 +767,7 @@ fn existing(key: &str, base: &Path, path: &Path) -> Result<PathBuf> {
     let path = base.join(path);
     match path.exists() {
         true => Ok(path),
-        false => Err(Error::refused(key, format!("there is no file {}", printable(path)))),
+        false => Err(Error::refused(key, format!("there is no file {}", shown_path(&path)))),
     }
 }
 

@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::input;
-use crate::payload::Part;
+use crate::parts::{Numbers, Parts};
 use crate::volume::bad;
-use crate::{Error, Result};
+use crate::{Error, Result, file};
+pub(crate) use cao_model::error::quoted;
 
 /// Longest header that is read. Segmentation and diffusion files carry long ones, none this long.
 const MAX_HEADER_BYTES: u64 = 16 << 20;
 
 /// More slices than this are a mistake in the pattern.
-const MAX_FILES: i128 = 1 << 20;
+const MAX_FILES: u64 = 1 << 20;
 
 /// Lines of a text header, and the byte where the next one begins.
 pub(crate) struct Lines<'a> {
@@ -25,7 +25,7 @@ pub(crate) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     pub(crate) fn open(path: &'a Path) -> Result<Self> {
-        let file = input::open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        let (file, _) = file::open(path).map_err(Error::io(path))?;
         Ok(Self { path, file: BufReader::new(file).take(MAX_HEADER_BYTES), position: 0 })
     }
 
@@ -49,11 +49,15 @@ impl<'a> Lines<'a> {
         Ok(Some(String::from_utf8_lossy(&line).into_owned()))
     }
 
-    /// The rest of the header's lines that are not empty, trimmed.
+    /// The rest of the header's lines that are not empty, trimmed: names of files.
     pub(crate) fn rest(&mut self) -> Result<Vec<String>> {
         let mut rest = Vec::new();
         while let Some(line) = self.next()? {
             if !line.trim().is_empty() {
+                if rest.len() as u64 == MAX_FILES {
+                    let problem = format!("more than {MAX_FILES} names after LIST");
+                    return Err(bad(self.path, "header", problem));
+                }
                 rest.push(line.trim().to_string());
             }
         }
@@ -99,25 +103,28 @@ impl<'a> Fields<'a> {
         numbers.map(Some).ok_or_else(|| bad(self.path, name, format!("{}, expected {what}", quoted(value))))
     }
 
+    /// Exactly `count` numbers.
+    pub(crate) fn list<T: std::str::FromStr>(
+        &self,
+        name: &str,
+        count: usize,
+        what: &str,
+    ) -> Result<Option<Vec<T>>> {
+        match self.numbers::<T>(name, what)? {
+            Some(numbers) if numbers.len() != count => {
+                Err(bad(self.path, name, format!("{} numbers, expected {count}", numbers.len())))
+            }
+            numbers => Ok(numbers),
+        }
+    }
+
     /// Exactly `N` numbers.
     pub(crate) fn array<T: std::str::FromStr, const N: usize>(
         &self,
         name: &str,
         what: &str,
     ) -> Result<Option<[T; N]>> {
-        let Some(numbers) = self.numbers::<T>(name, what)? else { return Ok(None) };
-        let count = numbers.len();
-        let array = numbers.try_into();
-        array.map(Some).map_err(|_| bad(self.path, name, format!("{count} numbers, expected {N}")))
-    }
-}
-
-/// A value as found, cut to what fits an error message.
-pub(crate) fn quoted(value: &str) -> String {
-    const SHOWN: usize = 60;
-    match value.char_indices().nth(SHOWN) {
-        Some((end, _)) => format!("{:?}…", &value[..end]),
-        None => format!("{value:?}"),
+        Ok(self.list(name, N, what)?.and_then(|numbers| numbers.try_into().ok()))
     }
 }
 
@@ -131,16 +138,16 @@ pub(crate) fn data_files(
     value: &str,
     rest: &[String],
     sizes: &[u64],
-) -> Result<Vec<Part>> {
+) -> Result<Parts> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let part = |name: &str| Part { path: folder.join(PathBuf::from(name)), start: 0 };
     let words: Vec<&str> = value.split_whitespace().collect();
-    let (names, piece): (Vec<String>, Option<u64>) = match words.as_slice() {
+    let listed = || Parts::listed(folder, rest.to_vec());
+    let (parts, piece): (Parts, Option<u64>) = match words.as_slice() {
         [] => return Err(bad(path, field, "empty, expected a file name, a pattern or LIST")),
-        ["LIST"] => (rest.to_vec(), None),
+        ["LIST"] => (listed(), None),
         // MetaIO writes the dimension as `2D`.
         ["LIST", n] if n.trim_end_matches('D').parse::<u64>().is_ok() => {
-            (rest.to_vec(), n.trim_end_matches('D').parse().ok())
+            (listed(), n.trim_end_matches('D').parse().ok())
         }
         [pattern, min, max, step, more @ ..] if pattern.contains('%') && more.len() <= 1 => {
             let piece = more.first().map(|n| n.parse());
@@ -151,9 +158,9 @@ pub(crate) fn data_files(
                     format!("{}, expected `pattern min max step` with whole numbers", quoted(value));
                 return Err(bad(path, field, problem));
             };
-            (numbered(path, field, pattern, [min, max, step])?, piece)
+            (Parts::numbered(folder, numbered(path, field, pattern, [min, max, step])?), piece)
         }
-        _ => return Ok(vec![part(value)]),
+        _ => return Ok(Parts::one(folder.join(value), 0)),
     };
     let dimension = sizes.len() as u64;
     let piece = piece.unwrap_or(dimension - 1);
@@ -162,43 +169,34 @@ pub(crate) fn data_files(
     }
     // Pieces of full dimension are slabs along the slowest axis, however many.
     let slowest = sizes.last().copied().unwrap_or(1);
-    let files = names.len() as u64;
+    let files = parts.len();
     let fits = if piece == dimension {
         files > 0 && slowest.is_multiple_of(files)
     } else {
         sizes[piece as usize..].iter().try_fold(1u64, |n, s| n.checked_mul(*s)) == Some(files)
     };
-    if !fits {
+    if !fits || files == 0 {
         let problem = format!("{files} data files of dimension {piece} do not make up the sizes {sizes:?}");
         return Err(bad(path, field, problem));
     }
-    Ok(names.iter().map(|name| part(name)).collect())
+    Ok(parts)
 }
 
 /// Names of a pattern with one `%d`, `%3d` or `%03d` (also `i`, `u`; `%%` is a percent sign), from min to max.
-fn numbered(path: &Path, field: &str, pattern: &str, range: [i64; 3]) -> Result<Vec<String>> {
+fn numbered(path: &Path, field: &str, pattern: &str, [min, max, step]: [i64; 3]) -> Result<Numbers> {
     // i128, because the ends of i64 may be further apart than i64 reaches.
-    let [min, max, step] = range.map(i128::from);
-    let span = max - min;
-    if step == 0 || span.signum() * step.signum() < 0 {
+    let span = i128::from(max) - i128::from(min);
+    if step == 0 || span.signum() * i128::from(step).signum() < 0 {
         return Err(bad(path, field, format!("{min} to {max} in steps of {step} never ends")));
     }
-    let count = span / step + 1;
-    if count > MAX_FILES {
+    let count = span / i128::from(step) + 1;
+    let Some(count) = u64::try_from(count).ok().filter(|n| *n <= MAX_FILES) else {
         return Err(bad(path, field, format!("{count} data files, expected at most {MAX_FILES}")));
-    }
-    let Some((before, zero, width, after)) = conversion(pattern) else {
+    };
+    let Some((before, zeros, width, after)) = conversion(pattern) else {
         return Err(bad(path, field, format!("{}, expected one number such as %03d in it", quoted(pattern))));
     };
-    let name = |i: i128| {
-        let number = min + i * step;
-        if zero {
-            format!("{before}{number:0width$}{after}")
-        } else {
-            format!("{before}{number:width$}{after}")
-        }
-    };
-    Ok((0..count).map(name).collect())
+    Ok(Numbers { before, after, zeros, width, first: min, step, count })
 }
 
 /// Splits a pattern at its one number: text before, whether padded with zeros, width, text after.

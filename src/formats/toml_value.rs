@@ -1,6 +1,7 @@
 //! Values of TOML files as users write them.
 
 use crate::{Error, Result};
+use cao_model::error::{quoted, shown as cut};
 use cao_model::transfer::{from_hex, to_linear};
 use toml::Value;
 
@@ -18,15 +19,20 @@ pub(crate) fn in_line(text: &str, error: &toml::de::Error) -> String {
     }
 }
 
+/// Characters of a value in a message.
+const MOST_SHOWN: usize = 90;
+
 /// A value as the user wrote it, or near enough to find it.
 pub(crate) fn shown(value: &Value) -> String {
+    // Of a list nobody reads more than fits.
+    let some = |entries: &[Value]| entries.iter().take(MOST_SHOWN).map(shown).collect::<Vec<_>>().join(", ");
     match value {
-        Value::String(text) => format!("{text:?}"),
+        Value::String(text) => quoted(text).to_string(),
         Value::Integer(number) => number.to_string(),
         Value::Float(number) => number.to_string(),
         Value::Boolean(truth) => truth.to_string(),
         Value::Datetime(moment) => moment.to_string(),
-        Value::Array(entries) => format!("[{}]", entries.iter().map(shown).collect::<Vec<_>>().join(", ")),
+        Value::Array(entries) => cut(&format!("[{}]", some(entries)), MOST_SHOWN),
         Value::Table(_) => "a table".into(),
     }
 }

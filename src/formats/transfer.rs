@@ -17,7 +17,8 @@
 //! ```
 
 use crate::toml_value::{in_line, number, parse_colour, shown};
-use crate::{Error, Result, input};
+use crate::{Error, Result, file};
+use cao_model::error::quoted;
 use cao_model::transfer::{TransferFunction, coloured, preset_names, to_srgb};
 use serde::Deserialize;
 use std::fmt::Write as _;
@@ -39,7 +40,7 @@ pub fn from_toml(text: &str) -> Result<TransferFunction> {
 /// # Errors
 /// As [`from_toml`].
 pub fn from_table(table: toml::Table) -> Result<TransferFunction> {
-    let file: File =
+    let file: Keys =
         table.try_into().map_err(|error: toml::de::Error| Error::refused("keys", error.message()))?;
     let opacity = list("opacity", &file.opacity)?
         .iter()
@@ -89,7 +90,11 @@ pub fn load(spec: impl AsRef<Path>, range: (f64, f64)) -> Result<TransferFunctio
         return Ok(TransferFunction::preset(name, range)?);
     }
     if !path.exists() {
-        let problem = format!("{path:?} is neither a file nor a preset ({})", preset_names());
+        let problem = format!(
+            "{} is neither a file nor a preset ({})",
+            quoted(&path.to_string_lossy()),
+            preset_names()
+        );
         return Err(Error::refused("transfer", problem));
     }
     read(path)
@@ -98,9 +103,9 @@ pub fn load(spec: impl AsRef<Path>, range: (f64, f64)) -> Result<TransferFunctio
 /// Reads a TOML file.
 ///
 /// # Errors
-/// [`Error::Io`] when it cannot be read; [`Error::File`] naming file and key when it is wrong.
+/// [`Error::Io`] when it cannot be read; [`Error::File`] naming file and key when it is wrong or too long.
 pub fn read(path: &Path) -> Result<TransferFunction> {
-    let text = input::read_to_string(path).map_err(Error::io(path))?;
+    let text = file::read_text(path)?;
     from_toml(&text).map_err(|error| error.in_file(path))
 }
 
@@ -126,7 +131,7 @@ pub fn to_toml(transfer: &TransferFunction) -> String {
 /// The file's keys. What they hold stays TOML, so that errors can say which key and which point is wrong.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+struct Keys {
     reference_mm: Option<Value>,
     opacity: Value,
     #[serde(alias = "color")]

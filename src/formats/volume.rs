@@ -1,71 +1,87 @@
 //! Volumes from files.
 //!
 //! Formats: NRRD (`.nrrd`, `.nhdr`), NIfTI-1 and -2 (`.nii`, `.nii.gz`, `.hdr` + `.img`), MetaImage (`.mha`, `.mhd`),
-//! and raw data with a description beside it ([`read_raw`]). The content decides which reader is used, the file's
+//! and raw data with a description beside it ([`read_raw`](crate::read_raw)). The content decides which reader is used, the file's
 //! extension only where a format has no signature.
 //!
 //! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header
-//! exactly (too short, too long, NaN, an unknown type) is refused with the file and the field named.
+//! (too short, NaN, an unknown type) is refused with the file and the field named; what follows the data is ignored with a
+//! warning. What a file leaves open, the caller says in a [`Reading`].
 
 use std::io::Read;
 use std::path::Path;
 
 use crate::grid::Grid;
+use crate::raw;
+use crate::reading::{Frame, NoNumbers, Opened, Reading};
 use crate::scene::VolumeSource;
-use crate::{Error, Result, input, metaimage, nifti, nrrd, read_raw};
+use crate::{Error, Result, file, metaimage, nifti, nrrd};
 use cao_model::builtin;
 use cao_model::values::{Endian, Values};
 use cao_model::volume::{Volume, check_finite};
 
-/// A volume by the name a user gives: a file ([`read`]), or `builtin:NAME:SIZE` ([`builtin::from_spec`]).
+/// A volume by the name a user gives: a file ([`read`]), or `builtin:NAME:SIZE` ([`builtin::from_spec`]). Warnings are left
+/// out; [`VolumeSource::open`] has them.
 ///
 /// Errors: those of [`read`] and [`builtin::from_spec`].
 pub fn open(spec: impl AsRef<Path>) -> Result<Volume> {
-    VolumeSource::parse(spec).open()
+    Ok(VolumeSource::parse(spec).open(&Reading::default())?.volume)
 }
 
 impl VolumeSource {
     /// Makes or reads the volume.
     ///
-    /// Errors: those of [`builtin::from_spec`], [`read`] and [`read_raw`].
-    pub fn open(&self) -> Result<Volume> {
+    /// Errors: those of [`builtin::from_spec`], [`read`] and [`read_raw`](crate::read_raw); [`Error::File`] or
+    /// [`cao_model::Error::Config`] naming `frame-index` when what is one volume has not the frame that was chosen.
+    pub fn open(&self, reading: &Reading) -> Result<Opened> {
         match self {
-            Self::Builtin(spec) => Ok(builtin::from_spec(spec)?),
-            Self::File(path) => read(path),
+            Self::Builtin(spec) => {
+                Frame::choose(reading, 1, false).map_err(|p| Error::refused("frame-index", p))?;
+                Ok(Opened { volume: builtin::from_spec(spec)?, warnings: Vec::new() })
+            }
+            Self::File(path) => read_as(path, reading),
             Self::Raw { path, dims, kind, spacing_mm, big_endian } => {
                 let endian = if *big_endian { Endian::Big } else { Endian::Little };
-                read_raw(path, *dims, kind, endian, *spacing_mm)
+                raw::read_as(path, *dims, kind, endian, *spacing_mm, reading)
             }
         }
     }
 }
 
-/// Reads a volume file of any format but raw.
+/// Reads a volume file of any format but raw, as [`read_as`] does by default, and leaves out the warnings.
+///
+/// Errors: those of [`read_as`].
+pub fn read(path: &Path) -> Result<Volume> {
+    Ok(read_as(path, &Reading::default())?.volume)
+}
+
+/// Reads a volume file of any format but raw, as `reading` says.
 ///
 /// Errors: [`Error::Io`] when the file cannot be opened; [`Error::File`] with the field when the content is of no
-/// known format, is incomplete, contradicts itself, or has values that are NaN or infinite.
-pub fn read(path: &Path) -> Result<Volume> {
-    let io = |source| Error::Io { path: path.into(), source };
+/// known format, is incomplete, contradicts itself, is a series of which no volume is chosen, or has values that are NaN or
+/// infinite and nothing stands for them.
+pub fn read_as(path: &Path, reading: &Reading) -> Result<Opened> {
+    let (file, _) = file::open(path).map_err(Error::io(path))?;
     let mut head = Vec::new();
-    input::open(path).map_err(io)?.take(HEAD_BYTES).read_to_end(&mut head).map_err(io)?;
+    file.take(HEAD_BYTES).read_to_end(&mut head).map_err(Error::io(path))?;
     if nrrd::is_nrrd(&head) {
-        return nrrd::read(path);
+        return nrrd::read(path, reading);
     }
     if nifti::is_nifti(&head) {
-        return nifti::read(path);
+        return nifti::read(path, reading);
     }
     if metaimage::is_metaimage(&head) {
-        return metaimage::read(path);
+        return metaimage::read(path, reading);
     }
     // Damaged at the start, or not of this format at all: the format's own reader says what is wrong with it.
     let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
     let ends = |list: &[&str]| list.iter().any(|end| name.ends_with(end));
     if ends(&[".nrrd", ".nhdr"]) {
-        nrrd::read(path)
+        nrrd::read(path, reading)
     } else if ends(&[".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"]) {
-        nifti::read(path)
+        nifti::read(path, reading)
     } else if ends(&[".mha", ".mhd"]) {
-        metaimage::read(path)
+        metaimage::read(path, reading)
     } else {
         Err(bad(path, "format", FORMATS))
     }
@@ -79,26 +95,42 @@ const FORMATS: &str = "not recognised, expected NRRD (.nrrd, .nhdr), NIfTI-1 or 
 
 /// An [`Error::File`].
 pub(crate) fn bad(path: &Path, field: &str, problem: impl Into<String>) -> Error {
-    Error::File { path: path.into(), field: field.into(), problem: problem.into() }
+    Error::file(path, field, problem)
 }
 
-/// The last step of every reader: values that are no numbers are refused, everything else was checked before.
-pub(crate) fn assemble(
-    path: &Path,
-    dims: [usize; 3],
-    grid: Grid,
-    values: Values,
-    scale: (f64, f64),
-) -> Result<Volume> {
-    check_finite(dims, &values).map_err(|p| bad(path, "data", p))?;
+/// What a reader found.
+pub(crate) struct Found {
+    pub(crate) dims: [usize; 3],
+    pub(crate) grid: Grid,
+    pub(crate) values: Values,
+    /// Slope and intercept.
+    pub(crate) scale: (f64, f64),
+    pub(crate) warnings: Vec<String>,
+}
+
+/// The last step of every reader: what stands for values that are no numbers; everything else was checked before.
+pub(crate) fn assemble(path: &Path, found: Found, reading: &Reading) -> Result<Opened> {
+    let Found { dims, grid, mut values, scale: (slope, intercept), warnings } = found;
+    match reading.no_numbers {
+        NoNumbers::Refuse => check_finite(dims, &values).map_err(|p| {
+            bad(path, "data", p + ", or --nan VALUE|transparent, which says what stands for them")
+        })?,
+        NoNumbers::Transparent => drop(values.replace_no_numbers(f64::NAN)),
+        NoNumbers::Value(value) => {
+            let replaced = values.replace_no_numbers((value - intercept) / slope);
+            if replaced > 0 && values.non_finite().is_some() {
+                let problem = format!("--nan {value} cannot be stored as {}", values.kind());
+                return Err(bad(path, "data", problem));
+            }
+        }
+    }
     let Grid { spacing, origin, directions, space } = grid;
-    let (slope, intercept) = scale;
     let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept };
-    if scale != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
+    if (slope, intercept) != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
         let problem = format!(
             "slope {slope} and intercept {intercept} lead beyond all numbers, expected finite values"
         );
         return Err(bad(path, "data", problem));
     }
-    Ok(volume)
+    Ok(Opened { volume, warnings })
 }

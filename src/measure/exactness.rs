@@ -91,8 +91,7 @@ impl Report {
     /// Share of all voxels that the clips affected (category b), the paper's measure of the contextual work (CAO §4); of methods that do not
     /// tell voxels apart, in whole bricks.
     pub fn affected(&self) -> f64 {
-        let sum =
-            |of: fn(&Categories) -> u32| self.cuts.iter().map(|cut| f64::from(of(&cut.categories))).sum();
+        let sum = |of: fn(&Categories) -> u64| self.cuts.iter().map(|cut| of(&cut.categories) as f64).sum();
         let (affected, other): (f64, f64) = (sum(|c| c.affected), sum(|c| c.clipped) + sum(|c| c.untouched));
         affected / (affected + other).max(1.0)
     }

@@ -9,6 +9,7 @@
 //! which keeps surfaces smooth. Only `+ - × ÷`, `sqrt` and comparisons are used, all exact by IEEE 754, so that no
 //! mathematical library can make a difference.
 
+use crate::error::quoted;
 use crate::values::Values;
 use crate::volume::Volume;
 use crate::{Error, Result};
@@ -75,7 +76,7 @@ pub fn builtin_box(name: &str, dims: [usize; 3], spacing: [f64; 3]) -> Result<Vo
         "sheets" => Values::U8(indexed(dims, |[_, _, z]| z % 8 == 4)),
         _ => {
             let names = NAMES.map(|(name, _)| name).join(", ");
-            return Err(refused(format!("no volume {name:?}; expected one of {names}")));
+            return Err(refused(format!("no volume {}; expected one of {names}", quoted(name))));
         }
     };
     Volume::new(dims, spacing, values)

@@ -1,5 +1,6 @@
 //! Clip shapes, their poses, and which points they hide (CAO §3.2).
 
+use crate::error::quoted;
 use crate::mesh::TriangleMesh;
 use crate::{Error, Result};
 use glam::{Mat3, Quat, Vec2, Vec3};
@@ -47,7 +48,8 @@ impl Shape {
         Self::ANALYTIC.into_iter().find(|shape| shape.name() == name).ok_or_else(|| Error::Config {
             what: "clip".into(),
             problem: format!(
-                "\"{name}\" is no shape; there are plane, box, sphere, cylinder, cone, torus, and any file.obj"
+                "{} is no shape; there are plane, box, sphere, cylinder, cone, torus, and any file.obj",
+                quoted(name)
             ),
         })
     }
@@ -102,7 +104,7 @@ impl Mode {
             "keep" => Ok(Self::Keep),
             _ => Err(Error::Config {
                 what: "clip mode".into(),
-                problem: format!("\"{name}\"; expected remove or keep"),
+                problem: format!("{}; expected remove or keep", quoted(name)),
             }),
         }
     }

@@ -1,6 +1,7 @@
 //! The methods of ambient occlusion: the one list that programs, scene files, charts, the planner and the README's table read.
 //! `cao::method` has a constructor for each.
 
+use crate::error::quoted;
 use crate::occlusion::{Quadrature, RaySet};
 use crate::{Error, Result};
 
@@ -109,7 +110,7 @@ impl Method {
     /// [`Error::Config`] for any other name.
     pub fn parse(name: &str) -> Result<Self> {
         METHODS.iter().find(|entry| entry.name == name).map(|entry| entry.method).ok_or_else(|| {
-            Error::refused("method", format!("{name:?}: expected {}", Self::names().join(", ")))
+            Error::refused("method", format!("{}: expected {}", quoted(name), Self::names().join(", ")))
         })
     }
 

@@ -1,5 +1,6 @@
 //! What is computed at a voxel: ray sets, quadrature along a ray, radius, start offset (method.md §2–§4).
 
+use crate::error::quoted;
 use crate::{Error, Result};
 use glam::Vec3;
 
@@ -62,7 +63,7 @@ impl RaySet {
             let most = Self::MOST;
             Error::refused(
                 "rays",
-                format!("\"{name}\" is no ray set; there are {sets} and spiral:N, N even, 2 … {most}"),
+                format!("{} is no ray set; there are {sets} and spiral:N, N even, 2 … {most}", quoted(name)),
             )
         })
     }
@@ -184,7 +185,11 @@ impl Quadrature {
     pub fn parse(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|rule| rule.name() == name).ok_or_else(|| Error::Config {
             what: "quadrature".into(),
-            problem: format!("\"{name}\" is no rule; there are {}", Self::ALL.map(Self::name).join(", ")),
+            problem: format!(
+                "{} is no rule; there are {}",
+                quoted(name),
+                Self::ALL.map(Self::name).join(", ")
+            ),
         })
     }
 }

@@ -5,6 +5,8 @@
 //! *reference length*: a ray that crosses one reference length of constant opacity `a` keeps the share `1 - a` of its
 //! light. Two points of equal value make a step; at the value itself the second one holds.
 
+use crate::error::quoted;
+use crate::values::FARTHEST;
 use crate::{Error, Result};
 
 /// Most points that opacity or colour may have: kernels keep them in a uniform block of fixed size.
@@ -21,6 +23,9 @@ pub const PRESETS: [(&str, &str); 5] = [
 
 /// Below this smallest value data are taken for Hounsfield units: air is -1000, and no 8-bit or MR volume goes there.
 const HOUNSFIELD_AIR: f64 = -500.0;
+
+/// Data nearer to 0 than this are all 0 to the device, or the distances of a preset's points are.
+const SMALLEST: f64 = 1e-36;
 
 /// The Hounsfield window that data of another range are taken to show from end to end.
 const HOUNSFIELD_WINDOW: (f64, f64) = (-1000.0, 1500.0);
@@ -85,6 +90,16 @@ impl TransferFunction {
         inside.fold(ends, |most, [_, opacity]| most.max(*opacity))
     }
 
+    /// Values of opacity 0, the one nearest to `low` first: `low` itself, or where the function begins or ends to be 0. Empty where it
+    /// is 0 nowhere.
+    pub fn transparent_near(&self, low: f32) -> Vec<f32> {
+        let at_points = self.opacity.iter().flat_map(|[value, _]| [*value, value.next_down()]);
+        let mut found: Vec<f32> =
+            std::iter::once(low).chain(at_points).filter(|v| self.opacity_at(*v) == 0.0).collect();
+        found.sort_by(|a, b| (a - low).abs().total_cmp(&(b - low).abs()));
+        found
+    }
+
     /// Reference length in mm for a volume whose smallest spacing is `min_spacing` mm.
     pub fn reference_mm(&self, min_spacing: f64) -> f32 {
         self.reference_mm.unwrap_or(min_spacing as f32)
@@ -94,16 +109,35 @@ impl TransferFunction {
     ///
     /// `ct-bone` and `ct-soft` are written in Hounsfield units and are used as they stand where the smallest value is
     /// below -500; other data are taken to show the window -1000…1500 HU from the smallest to the largest value.
-    /// `mr` and `paper` are written in shares of the range. A range of one value is widened to include 0 (or 1).
+    /// `mr` and `paper` are written in shares of the range. A range of one value is widened to include 0 (or 1); so is one whose values
+    /// are the same to 32-bit floating point, or nearly.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that is none of [`PRESETS`], or a range that is not finite or descends.
+    /// [`Error::Config`] for a name that is none of [`PRESETS`], a range that is not finite or descends, or data that no preset can tell
+    /// apart: beyond [`FARTHEST`], or all but 0.
     pub fn preset(name: &str, range: (f64, f64)) -> Result<Self> {
         if !(range.0.is_finite() && range.1.is_finite() && range.0 <= range.1) {
             let problem = format!("data run from {} to {}: expected two ascending numbers", range.0, range.1);
             return Err(Error::refused("range", problem));
         }
-        let hounsfield = range.0 < HOUNSFIELD_AIR;
+        let (low, high) = range;
+        let run = |problem: &str| {
+            let problem = format!("the data run from {low:?} to {high:?}, {problem}");
+            Err(Error::refused(&format!("preset {}", quoted(name)), problem))
+        };
+        if low < -FARTHEST || high > FARTHEST {
+            return run(&format!(
+                "farther than {FARTHEST:.1e} from 0, which no preset can show; values that stand for `no data` can be read as others \
+                 (--nan VALUE|transparent), or a transfer function of your own says what the values mean (--transfer FILE)"
+            ));
+        }
+        let largest = low.abs().max(high.abs());
+        if largest > 0.0 && largest < SMALLEST {
+            return run(
+                "too near to 0 to be told apart; expected larger values, or the same in a smaller unit",
+            );
+        }
+        let hounsfield = low < HOUNSFIELD_AIR;
         let (opacity, colour): (Points<f32>, Points<u32>) = match name {
             "auto" => return Self::preset(if hounsfield { "ct-bone" } else { "paper" }, range),
             "ct-bone" => (
@@ -136,25 +170,29 @@ impl TransferFunction {
             _ => {
                 return Err(Error::refused(
                     "transfer",
-                    format!("no preset {name:?}; expected one of {}", preset_names()),
+                    format!("no preset {}; expected one of {}", quoted(name), preset_names()),
                 ));
             }
         };
-        let value: Box<dyn Fn(f64) -> f32> = if !name.starts_with("ct-") {
-            let (low, high) = widened(range);
-            Box::new(move |share| (low + share * (high - low)) as f32)
-        } else if hounsfield {
-            Box::new(|value| value as f32)
-        } else {
-            let (low, high) = widened(range);
+        let placed = |(low, high): (f64, f64)| {
             let (air, bone) = HOUNSFIELD_WINDOW;
-            Box::new(move |hounsfield| (low + (hounsfield - air) / (bone - air) * (high - low)) as f32)
+            let place = |at: f64| match (name.starts_with("ct-"), hounsfield) {
+                (true, true) => at as f32,
+                (true, false) => (low + (at - air) / (bone - air) * (high - low)) as f32,
+                (false, _) => (low + at * (high - low)) as f32,
+            };
+            Self {
+                opacity: opacity.iter().map(|&(at, opacity)| [place(at), opacity]).collect(),
+                colour: colour.iter().map(|&(at, rgb)| coloured(place(at), from_hex(rgb))).collect(),
+                reference_mm: None,
+            }
         };
-        Self::new(
-            opacity.iter().map(|&(at, opacity)| [value(at), opacity]).collect(),
-            colour.iter().map(|&(at, rgb)| coloured(value(at), from_hex(rgb))).collect(),
-            None,
-        )
+        let made = placed(widened(range));
+        // Points that fell together: to 32 bits the data are one value.
+        let told_apart = made.opacity.is_sorted_by(|a, b| a[0] < b[0]);
+        let made = if told_apart { made } else { placed(widened((high, high))) };
+        made.check()?;
+        Ok(made)
     }
 
     /// Is `name` one of [`PRESETS`]?
@@ -194,7 +232,7 @@ fn check_points<const N: usize>(key: &str, points: &[[f32; N]]) -> Result<()> {
         let at = format!("{key}[{i}]");
         let value = point[0];
         // The difference of two values must be a number too.
-        if !value.is_finite() || value.abs() > f32::MAX / 4.0 {
+        if !value.is_finite() || f64::from(value.abs()) > FARTHEST {
             return Err(Error::refused(&at, format!("value {value}: expected a finite number below 8.5e37")));
         }
         if let Some(wrong) = point[1..].iter().find(|c| !(0.0..=1.0).contains(*c)) {

@@ -2,6 +2,10 @@
 
 use std::io::{self, Read};
 
+/// The data value that is farthest from 0 and still means something: the difference of any two must be a number of 32 bits. Files that
+/// write the largest number for *no data* are beyond it.
+pub const FARTHEST: f64 = (f32::MAX / 4.0) as f64;
+
 /// Stored values, one a voxel, x fastest, in the file's own type: nothing is cut to fewer bits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
@@ -78,7 +82,7 @@ impl Values {
         each!(self, v => v[i].to_f64())
     }
 
-    /// Smallest and largest stored value; `None` without values.
+    /// Smallest and largest stored value; those that are NaN or infinite do not count, and `None` where there are no others.
     pub fn range(&self) -> Option<(f64, f64)> {
         each!(self, v => range(v))
     }
@@ -86,6 +90,16 @@ impl Values {
     /// Index of the first value that is NaN or infinite, and how many there are.
     pub fn non_finite(&self) -> Option<(usize, usize)> {
         each!(self, v => non_finite(v))
+    }
+
+    /// Sets every value that is NaN, infinite or farther from 0 than [`FARTHEST`] to `to`; returns how many there were. Integers never
+    /// are.
+    pub fn replace_no_numbers(&mut self, to: f64) -> usize {
+        match self {
+            Values::F32(v) => replace(v, |x| no_number(f64::from(x)), to as f32),
+            Values::F64(v) => replace(v, no_number, to),
+            _ => 0,
+        }
     }
 
     /// Empty values of `kind` with room for `count`; `None` when the system has not the memory.
@@ -248,9 +262,17 @@ macro_rules! sample {
 }
 sample!(integers: u8 i8 u16 i16 u32 i32 u64 i64; floats: f32 f64);
 
+fn no_number(x: f64) -> bool {
+    x.is_nan() || x.abs() > FARTHEST
+}
+
+fn replace<T: Copy>(values: &mut [T], is: impl Fn(T) -> bool, to: T) -> usize {
+    values.iter_mut().filter(|v| is(**v)).map(|v| *v = to).count()
+}
+
 fn range<T: Sample>(values: &[T]) -> Option<(f64, f64)> {
-    let first = *values.first()?;
-    let (low, high) = values.iter().fold((first, first), |(low, high), &v| {
+    let first = *values.iter().find(|v| v.finite())?;
+    let (low, high) = values.iter().filter(|v| v.finite()).fold((first, first), |(low, high), &v| {
         (if v < low { v } else { low }, if v > high { v } else { high })
     });
     Some((low.to_f64(), high.to_f64()))

@@ -1,5 +1,6 @@
 //! A volume: values on a regular grid, and where it lies.
 
+use crate::transfer::TransferFunction;
 use crate::values::Values;
 use crate::{Error, Result};
 
@@ -42,21 +43,7 @@ impl Volume {
     /// Errors: [`Error::Config`] when a dimension is 0, the number of values is not the product of `dims`, a spacing
     /// (mm) is not positive and reasonable, or a value is NaN or infinite.
     pub fn new(dims: [usize; 3], spacing: [f64; 3], values: Values) -> Result<Self> {
-        let config = |what: &str, problem: String| Error::Config { what: what.into(), problem };
-        let count = voxel_count(dims.map(|d| d as u64)).map_err(|p| config("dims", p))?;
-        check_spacing(spacing).map_err(|p| config("spacing", p))?;
-        if values.len() != count {
-            let problem = format!(
-                "{} values, expected {count} for {} × {} × {} voxels",
-                values.len(),
-                dims[0],
-                dims[1],
-                dims[2]
-            );
-            return Err(config("values", problem));
-        }
-        check_finite(dims, &values).map_err(|p| config("values", p))?;
-        Ok(Self {
+        let volume = Self {
             dims,
             spacing,
             origin: [0.0; 3],
@@ -65,7 +52,51 @@ impl Volume {
             values,
             slope: 1.0,
             intercept: 0.0,
-        })
+        };
+        volume.check()?;
+        Ok(volume)
+    }
+
+    /// Is it what [`Volume::new`] would accept? For one whose fields were changed by hand, or that was read with its NaN.
+    ///
+    /// Errors: as [`Volume::new`].
+    pub fn check(&self) -> Result<()> {
+        let [x, y, z] = self.dims;
+        let count = voxel_count(self.dims.map(|d| d as u64)).map_err(|p| Error::refused("dims", p))?;
+        check_spacing(self.spacing).map_err(|p| Error::refused("spacing", p))?;
+        if self.len() != count {
+            let problem = format!("{} values, expected {count} for {x} × {y} × {z} voxels", self.len());
+            return Err(Error::refused("values", problem));
+        }
+        check_finite(self.dims, &self.values).map_err(|p| Error::refused("values", p))
+    }
+
+    /// Gives voxels that are NaN, infinite or beyond [`FARTHEST`](crate::values::FARTHEST) a value of which `transfer` makes opacity 0
+    /// exactly; of all such values one near the smallest. They are then drawn as any voxel without opacity is. Returns how many there
+    /// were.
+    ///
+    /// Errors: [`Error::Config`] naming `transfer` when there are such voxels and no such value.
+    pub fn hide_no_numbers(&mut self, transfer: &TransferFunction) -> Result<usize> {
+        let count = self.values.replace_no_numbers(f64::NAN);
+        if count == 0 {
+            return Ok(0);
+        }
+        let stored = |value: f32| (f64::from(value) - self.intercept) / self.slope;
+        // What comes back from the stored number, in its type, may be another value by a rounding.
+        let hidden = |stored: &f64| {
+            let stored =
+                if matches!(self.values, Values::F32(_)) { f64::from(*stored as f32) } else { *stored };
+            let value = (self.slope * stored + self.intercept) as f32;
+            stored.is_finite() && value.is_finite() && transfer.opacity_at(value) == 0.0
+        };
+        let low = self.range().0 as f32;
+        let Some(value) = transfer.transparent_near(low).into_iter().map(stored).find(hidden) else {
+            let problem = format!(
+                "has no value of opacity 0 for the {count} voxels that hold no number; expected one, or a value for them"
+            );
+            return Err(Error::refused("transfer", problem));
+        };
+        Ok(self.values.replace_no_numbers(value))
     }
 
     /// Number of voxels.
@@ -89,7 +120,7 @@ impl Volume {
         self.value(x + self.dims[0] * (y + self.dims[1] * z))
     }
 
-    /// Smallest and largest value.
+    /// Smallest and largest value; those that are NaN or infinite do not count.
     pub fn range(&self) -> (f64, f64) {
         let (low, high) = self.values.range().unwrap_or((0.0, 0.0));
         let (a, b) = (self.slope * low + self.intercept, self.slope * high + self.intercept);

@@ -4,9 +4,11 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod hostile;
 mod house;
 mod mesh;
 mod outputs;
+mod readings;
 mod scene;
 mod shaders;
 mod transfer;

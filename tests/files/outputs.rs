@@ -79,7 +79,7 @@ fn a_file_that_was_read_is_known_by_every_name() {
     fs::hard_link(at("read"), at("hard")).unwrap();
     symlink("hard", at("soft")).unwrap();
     assert!(!input::was_read(&at("read")));
-    assert_eq!(input::read_to_string(&at("soft")).unwrap(), "the same");
+    assert_eq!(cao_formats::file::read_text(&at("soft")).unwrap(), "the same");
     let known = ["read", "alike", "hard", "soft", "./soft", "absent"].map(|name| input::was_read(&at(name)));
     assert_eq!(known, [true, false, true, true, true, false]);
 }

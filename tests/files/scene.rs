@@ -33,7 +33,7 @@ fn a_volume_is_enough() {
     let scene = with("");
     let default = Scene::default_for(VolumeSource::parse("builtin:engine:16"));
     assert_eq!(format!("{scene:?}"), format!("{default:?}"));
-    assert_eq!(scene.volume.open().unwrap().dims, [16; 3]);
+    assert_eq!(scene.volume.open(&scene.reading).unwrap().volume.dims, [16; 3]);
     let occlusion = scene.occlusion.setup(0.5).unwrap().occlusion;
     assert_eq!(
         (occlusion.radius_mm, occlusion.rays, occlusion.quadrature),
@@ -152,7 +152,7 @@ fn files_are_found_beside_the_scene() {
             big_endian: true
         }
     );
-    let volume = scene.volume.open().unwrap();
+    let volume = scene.volume.open(&scene.reading).unwrap().volume;
     assert_eq!((volume.at(0, 0, 0), volume.at(1, 0, 0), volume.spacing), (1.0, 2.0, [1.0, 1.0, 2.0]));
     assert_eq!(scene.transfer(volume.range()).unwrap().opacity_at(0.0), 0.25);
     for clip in &scene.clips {

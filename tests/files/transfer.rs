@@ -142,6 +142,59 @@ fn every_preset_fits_every_range() {
     assert_eq!(TransferFunction::preset("paper", (0.0, 255.0)).unwrap().colour.len(), 1);
 }
 
+/// Data that are one value to 32 bits are shown as such; data that no preset can show are spoken of, not points that nobody wrote.
+#[test]
+fn presets_work_on_data_whose_range_defeats_them_or_speak_of_the_data() {
+    let next = |x: f32| f64::from(x.next_up());
+    for (name, _) in PRESETS {
+        for range in [
+            (1.0, 1.0 + 1e-12),
+            (1.0, next(1.0)),
+            (1e6, next(1e6_f32.next_up())),
+            (1e30, next(1e30)),
+            (4096.0, 4096.001),
+            (0.1, f64::from(0.1f32)),
+            (8e37, 8.4e37),
+        ] {
+            let tf =
+                TransferFunction::preset(name, range).unwrap_or_else(|e| panic!("{name} {range:?}: {e}"));
+            assert!(tf.opacity.is_sorted_by(|a, b| a[0] < b[0]), "{name} {range:?}");
+            for value in [range.0, range.1] {
+                let seen = tf.opacity_at(value as f32) > 0.5;
+                // Within a range that 32 bits do not resolve, everything is seen alike.
+                assert!(seen || range.0 == 8e37 || value < range.1, "{name} {range:?} {value}");
+            }
+        }
+        let (max, huge) = (f64::from(f32::MAX), f64::MAX);
+        for range in
+            [(0.0, max), (-max, 5.0), (-max, max), (0.0, huge), (-huge, huge), (0.0, 1e-40), (-1e-300, 0.0)]
+        {
+            let error = TransferFunction::preset(name, range).unwrap_err().to_string();
+            assert!(error.contains("the data run from") && error.contains(name), "{error}");
+            assert!(!error.contains("opacity[") && !error.contains("colour["), "{error}");
+            if range.1 > 1.0 {
+                assert!(
+                    error.contains("--nan VALUE|transparent") && error.contains("--transfer FILE"),
+                    "{error}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn values_without_opacity_are_found_nearest_first() {
+    assert_eq!(opacity(&[[1.0, 0.0], [2.0, 1.0]]).transparent_near(-5.0)[0], -5.0);
+    assert_eq!(
+        opacity(&[[1.0, 0.5], [2.0, 0.0], [3.0, 0.0]]).transparent_near(0.0)[0],
+        2.0f32.next_down().max(2.0)
+    );
+    assert_eq!(opacity(&[[1.0, 0.5]]).transparent_near(0.0), []);
+    // The step belongs to the second point.
+    assert_eq!(opacity(&[[1.0, 0.0], [1.0, 0.5]]).transparent_near(7.0), [1.0f32.next_down(); 2]);
+    assert_eq!(opacity(&[[0.0, 0.5], [1.0, 0.0], [1.0, 0.5]]).transparent_near(7.0), []);
+}
+
 #[test]
 fn ct_presets_keep_hounsfield_units_and_map_other_data() {
     let hounsfield = TransferFunction::preset("ct-bone", (-1024.0, 3071.0)).unwrap();

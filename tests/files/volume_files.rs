@@ -5,14 +5,14 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use cao_formats::Error;
+use cao_formats::{Error, NoNumbers, Reading};
 use cao_model::values::{Endian, Values};
 use cao_model::volume::{Space, Volume};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
-const DIMS: [usize; 3] = [5, 3, 2];
-const COUNT: usize = 30;
+pub const DIMS: [usize; 3] = [5, 3, 2];
+pub const COUNT: usize = 30;
 const ENDIANS: [(Endian, &str); 2] = [(Endian::Little, "little"), (Endian::Big, "big")];
 
 /// 30 values of every type, with both ends of its range.
@@ -42,7 +42,7 @@ fn all_types() -> Vec<Values> {
     ]
 }
 
-fn bytes_of(values: &Values, endian: Endian) -> Vec<u8> {
+pub fn bytes_of(values: &Values, endian: Endian) -> Vec<u8> {
     macro_rules! bytes {
         ($v:ident) => {
             match endian {
@@ -65,7 +65,7 @@ fn bytes_of(values: &Values, endian: Endian) -> Vec<u8> {
     }
 }
 
-fn text_of(values: &Values) -> Vec<u8> {
+pub fn text_of(values: &Values) -> Vec<u8> {
     macro_rules! text {
         ($v:ident) => {
             $v.iter().map(|x| format!("{x}\n")).collect::<String>().into_bytes()
@@ -85,27 +85,27 @@ fn text_of(values: &Values) -> Vec<u8> {
     }
 }
 
-fn gzip(bytes: &[u8]) -> Vec<u8> {
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     out.write_all(bytes).unwrap();
     out.finish().unwrap()
 }
 
-fn zlib(bytes: &[u8]) -> Vec<u8> {
+pub fn zlib(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
     out.write_all(bytes).unwrap();
     out.finish().unwrap()
 }
 
 /// A folder with files, gone after the test.
-struct Folder(TempDir);
+pub struct Folder(pub TempDir);
 
 impl Folder {
-    fn new() -> Self {
+    pub fn new() -> Self {
         Folder(tempfile::tempdir().unwrap())
     }
 
-    fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
+    pub fn put(&self, name: &str, bytes: &[u8]) -> PathBuf {
         let path = self.0.path().join(name);
         fs::write(&path, bytes).unwrap();
         path
@@ -122,13 +122,18 @@ impl Folder {
 }
 
 /// A text header followed by data.
-fn joined(header: &str, data: &[u8]) -> Vec<u8> {
+pub fn joined(header: &str, data: &[u8]) -> Vec<u8> {
     [header.as_bytes(), data].concat()
 }
 
 /// Asserts that reading was refused for `field` of `file`, in words that hold all of `says`.
 #[track_caller]
-fn assert_refused(result: cao_formats::Result<Volume>, file: &Path, field: &str, says: &[&str]) {
+pub fn assert_refused<T: std::fmt::Debug>(
+    result: cao_formats::Result<T>,
+    file: &Path,
+    field: &str,
+    says: &[&str],
+) {
     let error = result.expect_err(&format!("{} should be refused for {field}", file.display()));
     let text = error.to_string();
     match &error {
@@ -144,7 +149,7 @@ fn assert_refused(result: cao_formats::Result<Volume>, file: &Path, field: &str,
 }
 
 #[track_caller]
-fn assert_close(found: [f64; 3], expected: [f64; 3]) {
+pub fn assert_close(found: [f64; 3], expected: [f64; 3]) {
     for a in 0..3 {
         assert!((found[a] - expected[a]).abs() < 1e-6, "{found:?}, expected {expected:?}");
     }
@@ -189,7 +194,7 @@ fn impossible_volumes_are_refused_by_name() {
 // ------------------------------------------------------------------------------------------------------------ NRRD
 
 /// A header of `fields`, with `changed` ones replaced (`None`: left out) or added.
-fn nrrd_header(changed: &[(&str, Option<&str>)]) -> String {
+pub fn nrrd_header(changed: &[(&str, Option<&str>)]) -> String {
     let mut fields: Vec<(&str, Option<&str>)> = vec![
         ("type", Some("int16")),
         ("dimension", Some("3")),
@@ -208,7 +213,7 @@ fn nrrd_header(changed: &[(&str, Option<&str>)]) -> String {
     format!("NRRD0004\n# made by a test\n{lines}key:=value: of no meaning\n")
 }
 
-fn nrrd_values() -> Values {
+pub fn nrrd_values() -> Values {
     Values::I16((0..30).map(|i| i * 100 - 1000).collect())
 }
 
@@ -488,7 +493,6 @@ fn nrrd_says_which_field_of_the_header_is_wrong() {
 fn nrrd_says_what_is_wrong_with_the_data() {
     let folder = Folder::new();
     let data = bytes_of(&nrrd_values(), Endian::Little);
-    let long = [data.as_slice(), &[0; 7]].concat();
     let packed = gzip(&data);
     let noise: Vec<u8> = (0..200u32).map(|i| ((i * i * 37) >> 3) as u8).collect();
     let mut flipped = packed.clone();
@@ -499,20 +503,16 @@ fn nrrd_says_what_is_wrong_with_the_data() {
     let cases: Vec<(&str, Vec<u8>, &[&str])> = vec![
         ("raw", data[..59].to_vec(), &["59 bytes", "exactly 60 bytes", "30 values of type int16"]),
         ("raw", vec![], &["0 bytes", "exactly 60 bytes"]),
-        ("raw", long.clone(), &["67 bytes", "exactly 60 bytes"]),
         ("gzip", vec![], &["0 bytes of compressed data", "60 bytes"]),
         ("gzip", packed[..packed.len() / 2].to_vec(), &["truncated or damaged", "60 bytes"]),
         ("gzip", packed[..packed.len() - 2].to_vec(), &["truncated or damaged"]),
         ("gzip", gzip(&data[..50]), &["50 bytes after decompression", "exactly 60 bytes"]),
-        ("gzip", gzip(&long), &["more than 60 bytes after decompression"]),
         ("gzip", flipped, &["truncated or damaged"]),
         ("gzip", wrong_sum, &["truncated or damaged"]),
-        ("gzip", [zlib(&data), vec![1, 2, 3]].concat(), &["3 bytes after the end"]),
         ("gzip", noise, &["truncated or damaged"]),
         ("ascii", b"1 2 3".to_vec(), &["5 bytes of text", "30 numbers"]),
         ("ascii", b"1 ".repeat(29), &["58 bytes of text"]),
         ("ascii", b"1,\t".repeat(29), &["29 numbers, expected 30"]),
-        ("ascii", b"1 ".repeat(31), &["more than 30 numbers"]),
         ("ascii", b"1 40000 ".repeat(15), &["value 1", "40000", "int16"]),
         ("ascii", b"1 x ".repeat(15), &["value 1", "\"x\""]),
         ("ascii", b"1 \xff ".repeat(15), &["value 1"]),
@@ -564,7 +564,9 @@ fn absurd_promises_cost_nothing_and_bombs_are_cut_off() {
     // 64 MiB of zeros where 60 bytes are expected.
     let header = nrrd_header(&[("encoding", Some("gzip"))]) + "\n";
     let path = folder.put("bomb.nrrd", &joined(&header, &gzip(&vec![0; 64 << 20])));
-    assert_refused(cao_formats::read(&path), &path, "data", &["more than 60 bytes after decompression"]);
+    let start = std::time::Instant::now();
+    assert_eq!(cao_formats::read(&path).unwrap().values, Values::I16(vec![0; COUNT]));
+    assert!(start.elapsed().as_secs_f64() < 0.2, "what follows the 60 bytes is not decompressed");
     // The same for a data file beside the header.
     let header = nrrd_header(&[("sizes", Some("5 3 20000000000"))]);
     let path = folder.put("a.nhdr", (header + "data file: bomb.nrrd\n").as_bytes());
@@ -582,7 +584,7 @@ fn values_that_are_no_numbers_are_refused_with_their_place_and_count() {
     let mut numbers = vec![1.0f32; COUNT];
     (numbers[16], numbers[29]) = (f32::NAN, f32::NEG_INFINITY);
     let values = Values::F32(numbers);
-    let says = ["2 of 30 values", "(NaN)", "voxel (1, 0, 1)", "finite"];
+    let says = ["2 of 30 values", "(NaN)", "voxel (1, 0, 1)", "finite", "--nan VALUE|transparent"];
     for encoding in ["raw", "ascii"] {
         let data = if encoding == "raw" { bytes_of(&values, Endian::Big) } else { text_of(&values) };
         let changes = [("type", Some("float")), ("endian", Some("big")), ("encoding", Some(encoding))];
@@ -609,15 +611,15 @@ fn values_that_are_no_numbers_are_refused_with_their_place_and_count() {
 
 /// A header of 348 or 540 bytes and its data, fields by their offsets in the format's description.
 #[derive(Clone)]
-struct Nifti {
-    header: Vec<u8>,
-    data: Vec<u8>,
+pub struct Nifti {
+    pub header: Vec<u8>,
+    pub data: Vec<u8>,
     endian: Endian,
     version: u8,
 }
 
 impl Nifti {
-    fn new(version: u8, values: &Values, endian: Endian) -> Self {
+    pub fn new(version: u8, values: &Values, endian: Endian) -> Self {
         let code: i16 = match values.kind() {
             "uint8" => 2,
             "int16" => 4,
@@ -652,7 +654,7 @@ impl Nifti {
         self.header[at..at + bytes.len()].copy_from_slice(&bytes);
     }
 
-    fn dim(&mut self, dim: &[i64]) {
+    pub fn dim(&mut self, dim: &[i64]) {
         for (i, d) in dim.iter().enumerate() {
             match self.version {
                 1 => self.put(40 + 2 * i, &(*d as i16).to_le_bytes()),
@@ -670,7 +672,7 @@ impl Nifti {
         }
     }
 
-    fn offset(&mut self, offset: f64) {
+    pub fn offset(&mut self, offset: f64) {
         match self.version {
             1 => self.put(108, &(offset as f32).to_le_bytes()),
             _ => self.put(168, &(offset as i64).to_le_bytes()),
@@ -703,7 +705,7 @@ impl Nifti {
         }
     }
 
-    fn file(&self) -> Vec<u8> {
+    pub fn file(&self) -> Vec<u8> {
         [self.header.as_slice(), &[0; 4], &self.data].concat()
     }
 }
@@ -833,7 +835,7 @@ fn nifti_says_which_field_is_wrong() {
     type Change = fn(&mut Nifti);
     let cases: Vec<(Change, &str, &[&str])> = vec![
         (|n| n.dim(&[2, 5, 6]), "dim[0]", &["2 dimensions", "expected 3"]),
-        (|n| n.dim(&[4, 5, 3, 2, 7]), "dim[4]", &["7, expected 1"]),
+        (|n| n.dim(&[4, 5, 3, 2, 7]), "dim[4]", &["a series of 7 volumes", "--frame-index 0 … 6"]),
         (|n| n.dim(&[5, 5, 3, 2, 1, 3]), "dim[5]", &["3, expected 1"]),
         (|n| n.dim(&[3, 5, -3, 2]), "dim[2]", &["-3"]),
         (|n| n.dim(&[3, 5, 0, 2]), "dim", &["5 × 0 × 2"]),
@@ -856,7 +858,6 @@ fn nifti_says_which_field_is_wrong() {
         (|n| (n.codes(1, 0), n.reals(QUATERN, &[f64::NAN])).0, "quatern", &["NaN"]),
         (|n| (n.codes(1, 0), n.reals(QOFFSET, &[f64::INFINITY])).0, "qoffset", &["inf"]),
         (|n| n.data.truncate(59), "data", &["59 bytes", "exactly 60 bytes"]),
-        (|n| n.data.push(0), "data", &["61 bytes", "exactly 60 bytes"]),
         (|n| n.header[if n.version == 1 { 344 } else { 4 }] = b'x', "magic", &["x+"]),
         (|n| n.header[0..4].fill(1), "sizeof_hdr", &["16843009", "348", "540"]),
         (|n| (n.header.truncate(300), n.data.truncate(10)).0, "header", &["314 bytes"]),
@@ -886,7 +887,7 @@ fn nifti_says_which_field_is_wrong() {
 // ------------------------------------------------------------------------------------------------------- MetaImage
 
 /// A header ending with the data file's line, its values replaced or added before that; `""` leaves a key out.
-fn meta_header(changed: &[(&str, &str)]) -> String {
+pub fn meta_header(changed: &[(&str, &str)]) -> String {
     let mut fields = vec![
         ("ObjectType", "Image"),
         ("NDims", "3"),
@@ -1058,10 +1059,8 @@ fn metaimage_says_which_field_is_wrong() {
     let path = folder.put("a.mha", b"\x00\x01\x02");
     assert_refused(cao_formats::read(&path), &path, "header", &["expected `Key = value`"]);
     let data = bytes_of(&nrrd_values(), Endian::Little);
-    for (bytes, found) in [(&data[..58], "58 bytes"), (&[data.clone(), data.clone()].concat(), "120 bytes")] {
-        let path = folder.put("a.mha", &joined(&meta_header(&[]), bytes));
-        assert_refused(cao_formats::read(&path), &path, "data", &[found, "exactly 60 bytes"]);
-    }
+    let path = folder.put("a.mha", &joined(&meta_header(&[]), &data[..58]));
+    assert_refused(cao_formats::read(&path), &path, "data", &["58 bytes", "exactly 60 bytes"]);
     let packed = zlib(&data);
     let path = folder
         .put("a.mha", &joined(&meta_header(&[("CompressedData", "True")]), &packed[..packed.len() - 3]));
@@ -1210,6 +1209,8 @@ fn a_failed_write_leaves_the_old_file_and_nothing_else() {
 
 // ----------------------------------------------------------------------------------------------------------- noise
 
+const SPECIMENS: usize = 16;
+
 /// Whole files of every format and encoding, small.
 fn specimens() -> Vec<(&'static str, Vec<u8>)> {
     let values = nrrd_values();
@@ -1221,6 +1222,16 @@ fn specimens() -> Vec<(&'static str, Vec<u8>)> {
         ("space origin", Some("(1,2,3)")),
         ("space units", Some("\"mm\" \"mm\" \"mm\"")),
     ];
+    let in_series = |kinds, sizes| {
+        [
+            ("dimension", Some("4")),
+            ("sizes", Some(sizes)),
+            ("spacings", Some("1 1 1 1")),
+            ("kinds", Some(kinds)),
+        ]
+    };
+    let mut in_time = Nifti::new(1, &values, Endian::Little);
+    in_time.dim(&[4, 5, 3, 1, 2]);
     let mut placed = Nifti::new(1, &values, Endian::Little);
     placed.codes(1, 0);
     vec![
@@ -1236,6 +1247,22 @@ fn specimens() -> Vec<(&'static str, Vec<u8>)> {
         ("a.mha", joined(&meta_header(&[("Offset", "1 2 3"), ("HeaderSize", "0")]), &little)),
         ("a.mha", joined(&meta_header(&[("CompressedData", "True")]), &zlib(&little))),
         ("a.mhd", meta_header(&[("ElementDataFile", "x%03d.raw 1 2 1")]).into_bytes()),
+        (
+            "a.nrrd",
+            joined(&(nrrd_header(&in_series("list domain domain domain", "2 5 3 1")) + "\n"), &little),
+        ),
+        (
+            "a.nrrd",
+            joined(&(nrrd_header(&in_series("domain domain domain time", "5 3 1 2")) + "\n"), &gzip(&little)),
+        ),
+        (
+            "a.mha",
+            joined(
+                &meta_header(&[("NDims", "4"), ("DimSize", "5 1 3 2"), ("ElementSpacing", "1 1 1 1")]),
+                &little,
+            ),
+        ),
+        ("a.nii.gz", gzip(&in_time.file())),
     ]
 }
 
@@ -1244,24 +1271,39 @@ fn read_damaged(name: &str, bytes: &[u8]) -> Result<(), TestCaseError> {
     let folder = Folder::new();
     folder.put("x001.raw", &[1; 30]);
     folder.put("x002.raw", &[2; 30]);
-    match cao_formats::read(&folder.put(name, bytes)) {
+    let path = folder.put(name, bytes);
+    let read = cao_formats::read(&path);
+    // A series: the last of its two, and holes in it.
+    let chosen = Reading { frame_index: Some(1), no_numbers: NoNumbers::Value(0.5) };
+    let read = read.or_else(|_| Ok(cao_formats::read_as(&path, &chosen)?.volume));
+    match read {
         Ok(volume) => {
             prop_assert_eq!(volume.len(), volume.dims.iter().product::<usize>());
             prop_assert!(volume.spacing.iter().all(|s| *s > 0.0 && s.is_finite()));
             prop_assert!((0..volume.len()).all(|i| volume.values.get(i).is_finite()));
         }
-        Err(error) => prop_assert!(matches!(error, Error::File { .. } | Error::Io { .. }), "{:?}", error),
+        Err(error) => {
+            prop_assert!(matches!(error, Error::File { .. } | Error::Io { .. }), "{:?}", error);
+            let text = error.to_string();
+            prop_assert!(text.len() < 3000 && !text.contains(char::is_control), "{:?}", text);
+            prop_assert!(text.contains(name) || text.contains("x00"), "no file is named: {:?}", text);
+        }
     }
     Ok(())
 }
 
 #[test]
 fn specimens_are_sound_before_they_are_damaged() {
+    assert_eq!(specimens().len(), SPECIMENS);
     for (name, bytes) in specimens() {
         let folder = Folder::new();
         folder.put("x001.raw", &[1; 30]);
         folder.put("x002.raw", &[2; 30]);
-        assert_eq!(cao_formats::read(&folder.put(name, &bytes)).unwrap().len(), COUNT, "{name}");
+        let path = folder.put(name, &bytes);
+        let chosen = Reading { frame_index: Some(1), ..Reading::default() };
+        let found = cao_formats::read(&path).or_else(|_| Ok(cao_formats::read_as(&path, &chosen)?.volume));
+        let found = found.unwrap_or_else(|e: Error| panic!("{e}"));
+        assert!([COUNT, COUNT / 2].contains(&found.len()), "{name}");
     }
 }
 
@@ -1269,14 +1311,14 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn truncated_files_never_panic(which in 0..12usize, keep in any::<prop::sample::Index>()) {
+    fn truncated_files_never_panic(which in 0..SPECIMENS, keep in any::<prop::sample::Index>()) {
         let (name, bytes) = specimens().swap_remove(which);
         read_damaged(name, &bytes[..keep.index(bytes.len())])?;
     }
 
     #[test]
     fn changed_bytes_never_panic(
-        which in 0..12usize,
+        which in 0..SPECIMENS,
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
     ) {
         let (name, mut bytes) = specimens().swap_remove(which);
@@ -1288,7 +1330,7 @@ proptest! {
     }
 
     #[test]
-    fn numbers_swapped_for_absurd_ones_never_panic(which in 0..12usize, word in any::<prop::sample::Index>(), absurd in 0..8usize) {
+    fn numbers_swapped_for_absurd_ones_never_panic(which in 0..SPECIMENS, word in any::<prop::sample::Index>(), absurd in 0..8usize) {
         const ABSURD: [&str; 8] =
             ["0", "-1", "18446744073709551615", "-9223372036854775808", "1e308", "nan", "-inf", "99999999999999999999999"];
         let (name, bytes) = specimens().swap_remove(which);
@@ -1303,7 +1345,7 @@ proptest! {
 
     #[test]
     fn inserted_and_removed_pieces_never_panic(
-        which in 0..12usize,
+        which in 0..SPECIMENS,
         at in any::<prop::sample::Index>(),
         remove in 0..40usize,
         insert in prop::collection::vec(any::<u8>(), 0..40),
@@ -1316,7 +1358,7 @@ proptest! {
     }
 
     #[test]
-    fn noise_never_panics(which in 0..12usize, head in 0..400usize, noise in prop::collection::vec(any::<u8>(), 0..600)) {
+    fn noise_never_panics(which in 0..SPECIMENS, head in 0..400usize, noise in prop::collection::vec(any::<u8>(), 0..600)) {
         let (name, bytes) = specimens().swap_remove(which);
         let bytes = [&bytes[..head.min(bytes.len())], noise.as_slice()].concat();
         read_damaged(name, &bytes)?;

@@ -182,7 +182,7 @@ fn errors_are_in_the_order_that_the_methods_promise(chart: &Chart) {
             assert!(truth.computed > 50 && truth.computed <= truth.counting, "{} {change:?}", scene.name);
             assert!(truth.surface > 50 && truth.convergence < 0.01, "{} {change:?} {truth:?}", scene.name);
         }
-        let affected = f64::from(scene.categories.affected) / 18.0_f64.powi(3);
+        let affected = scene.categories.affected as f64 / 18.0_f64.powi(3);
         assert!((0.05..0.8).contains(&affected), "{}: {affected}", scene.name);
         assert!(scene.recomputed > 0.0 && scene.recomputed < 1.0, "{}: {}", scene.name, scene.recomputed);
     }

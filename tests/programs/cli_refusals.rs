@@ -68,13 +68,12 @@ fn malformed_volumes_are_refused_by_file_and_field_whatever_the_command() {
     let meta = "ObjectType = Image\nNDims = 3\nDimSize = 4 4 4\nElementType = MET_UCHAR\n";
     let bad: &[(&str, Vec<u8>, &[&str])] = &[
         ("short.nrrd", nrrd("uchar", "4 4 4", ones, &[0; 10]), &["data", "10 bytes", "expected exactly 64 bytes"]),
-        ("long.nrrd", nrrd("uchar", "4 4 4", ones, &[0; 65]), &["data", "65 bytes", "expected exactly 64 bytes"]),
         ("cut.nrrd", whole[..40].to_vec(), &[]),
         ("huge.nrrd", nrrd("uchar", "4000000000 4000000000 4000000000", ones, &[0; 64]), &["sizes", "memory"]),
         ("vast.nrrd", nrrd("double", "100000 100000 1000", ones, &[0; 64]), &["data", "64 bytes", "expected"]),
         ("none.nrrd", nrrd("uchar", "4 0 4", ones, &[]), &["sizes", "expected"]),
         ("flat.nrrd", nrrd("uchar", "-4 4 4", ones, &[0; 64]), &["sizes", "expected"]),
-        ("nan.nrrd", nrrd("float", "4 4 4", ones, &with_nan), &["data", "NaN", "voxel (1, 1, 1)", "finite"]),
+        ("nan.nrrd", nrrd("float", "4 4 4", ones, &with_nan), &["data", "NaN", "voxel (1, 1, 1)", "finite", "--nan VALUE|transparent"]),
         ("type.nrrd", nrrd("quadruple", "4 4 4", ones, &[0; 64]), &["type", "quadruple", "expected"]),
         ("far.nrrd", nrrd("uchar", "4 4 4", "1 nan 1", &[0; 64]), &["spacings", "expected"]),
         (

@@ -6,6 +6,7 @@ mod cli;
 mod cli_outputs;
 mod cli_refusals;
 mod peers;
+mod readings;
 mod stereo_bench;
 mod support;
 mod targets;

@@ -1,7 +1,6 @@
 //! How the programs write their files, where the whole program is too long a way to see it.
 
 use cao_cli::targets::Targets;
-use cao_formats::input;
 use std::fs;
 
 #[test]
@@ -33,7 +32,7 @@ fn a_file_that_was_read_meanwhile_is_spared() {
     let targets = Targets::files([&output], "csv").unwrap();
     targets.spare_inputs().unwrap();
     let written = targets.write(|files| {
-        input::read_to_string(&input)?;
+        cao_formats::file::read_text(&input)?;
         fs::hard_link(&input, &output)?;
         Ok(files.write(&output, |file| file.write_all(b"output"))?)
     });

@@ -7,6 +7,7 @@ mod edits;
 mod embed;
 mod exactness;
 mod leaks;
+mod limits;
 mod methods;
 mod planner;
 mod real_data;

@@ -34,6 +34,8 @@ pub struct Volumes {
 impl Volumes {
     /// Allocates them for a field; V_AO holds 1, nothing is clipped. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
+        // Classification counts its categories.
+        field.countable()?;
         let bricks = 4 * u64::from(field.brick_count());
         let volumes = Self {
             full_opacity: volume_image(gpu, "full opacity", field, Format::R32Float)?,
@@ -92,6 +94,6 @@ impl Kernels {
     /// What the last classification counted.
     pub(super) fn categories(&self, on: &Subject) -> crate::Result<Categories> {
         let counted = read_buffer(&on.gpu, &self.classify.count)?;
-        Ok(Categories::each(|category| Classify::count_of(&counted, category)))
+        Ok(Categories::each(|category| Classify::count_of(&counted, category).into()))
     }
 }

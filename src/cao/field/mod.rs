@@ -35,9 +35,14 @@ pub struct Field {
 
 impl Field {
     /// Copies a volume to the device through a staging buffer. Uses the device's queue and waits for it.
+    ///
+    /// # Errors
+    /// [`cao_model::Error::Config`] as [`Volume::check`], [`cao_model::Error::Limit`] for more bricks than 32 bits count,
+    /// [`cao_gpu::Error`] beyond the device's sizes or memory.
     pub fn upload(gpu: &Gpu, volume: &Volume) -> Result<Self> {
+        let dims = dims(volume)?;
+        volume.check()?;
         let (format, scale, bias, levels) = coding(gpu, volume);
-        let dims = volume.dims.map(|d| d as u32);
         let image = gpu.image(
             "volume",
             &ImageDesc { dims, layers: 1, format, kind: ImageKind::D3, usage: ImageUse::SAMPLED },
@@ -54,10 +59,12 @@ impl Field {
     /// it.
     ///
     /// # Errors
-    /// [`cao_model::Error::Config`] if the box is not inside, or the values are stored or rescaled in another way.
+    /// [`cao_model::Error::Config`] as [`Volume::check`], if the box is not inside, or if the values are stored or rescaled in another way.
     pub fn overwrite(&self, gpu: &Gpu, first: [u32; 3], values: &Volume) -> Result<()> {
         let refuse = |problem: String| Err(Error::refused("new values", problem));
-        let inside = (0..3).all(|i| first[i] as usize + values.dims[i] <= self.dims[i] as usize);
+        values.check()?;
+        let end = |i: usize| (first[i] as usize).checked_add(values.dims[i]);
+        let inside = (0..3).all(|i| end(i).is_some_and(|end| end <= self.dims[i] as usize));
         if !inside {
             return refuse(format!("{:?} voxels at {first:?} of {:?}", values.dims, self.dims));
         }
@@ -79,6 +86,20 @@ impl Field {
         self.bricks().iter().product()
     }
 
+    /// Refuses more voxels than kernels count in 32 bits.
+    pub fn countable(&self) -> cao_gpu::Result<()> {
+        let voxels = self.dims.iter().fold(1u64, |product, n| product.saturating_mul(u64::from(*n)));
+        match u32::try_from(voxels) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(cao_gpu::Error::Limit {
+                what: "counting voxels".into(),
+                needed: voxels,
+                limit: u32::MAX.into(),
+                hint: "choose a smaller volume".into(),
+            }),
+        }
+    }
+
     /// Smallest distance between voxel centres in mm.
     pub fn min_spacing(&self) -> f32 {
         self.spacing.into_iter().fold(f32::INFINITY, f32::min)
@@ -88,6 +109,24 @@ impl Field {
     pub fn diagonal(&self) -> f32 {
         glam::Vec3::from_array(self.spacing).length()
     }
+}
+
+/// Voxels along x, y, z, of which the bricks have numbers of 32 bits.
+fn dims(volume: &Volume) -> Result<[u32; 3]> {
+    let bricks = volume.dims.map(|d| (d as u64).div_ceil(BRICK.into()));
+    let bricks = bricks.into_iter().fold(1u64, u64::saturating_mul);
+    let limit = |what: String, needed: u64| cao_model::Error::Limit {
+        what,
+        needed,
+        limit: u32::MAX.into(),
+        hint: "choose a smaller volume".into(),
+    };
+    u32::try_from(bricks).map_err(|_| limit(format!("volume: bricks of {BRICK}³ voxels"), bricks))?;
+    let mut dims = [0; 3];
+    for (to, from) in dims.iter_mut().zip(volume.dims) {
+        *to = u32::try_from(from).map_err(|_| limit("volume: voxels along an axis".into(), from as u64))?;
+    }
+    Ok(dims)
 }
 
 /// Format of the texels that hold a volume, and `scale`, `bias` and `levels` of its [`Field`].
@@ -103,8 +142,8 @@ fn coding(gpu: &Gpu, volume: &Volume) -> (Format, f32, f32, f32) {
 /// staging.
 fn copy(gpu: &Gpu, image: &Image, [x, y, z]: [u32; 3], volume: &Volume) -> Result<()> {
     let format = image.desc().format;
-    let dims = volume.dims.map(|d| d as u32);
-    let slice = (dims[0] * dims[1]) as usize;
+    let dims = dims(volume)?;
+    let slice = volume.dims[0] * volume.dims[1];
     let slice_bytes = slice as u64 * format.bytes();
     let slices = ((64 << 20) / slice_bytes.max(1)).clamp(1, u64::from(dims[2])) as u32;
     let staging = gpu.buffer("volume staging", slice_bytes * u64::from(slices), BufferUse::Upload)?;
@@ -141,7 +180,8 @@ fn texels(volume: &Volume, format: Format, range: std::ops::Range<usize>) -> Vec
         (Values::I16(v), Format::R16Unorm) => {
             v[range].iter().flat_map(|v| ((*v as u16) ^ 0x8000).to_ne_bytes()).collect()
         }
-        _ => range.flat_map(|i| (volume.value(i) as f32).to_ne_bytes()).collect(),
+        // Beyond the largest number of 32 bits a transfer function goes on as it is there.
+        _ => range.flat_map(|i| (volume.value(i) as f32).clamp(f32::MIN, f32::MAX).to_ne_bytes()).collect(),
     }
 }
 

@@ -246,7 +246,7 @@ impl Ambient for Traced {
     fn mask(&self, on: &Subject) -> Result<Vec<u8>> {
         let todo: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&on.gpu, &self.volumes.todo)?);
         let ([x, y, z], [bx, by, _]) = (on.field.dims, on.field.bricks());
-        let mut mask = Vec::with_capacity((x * y * z) as usize);
+        let mut mask = Vec::with_capacity(x as usize * y as usize * z as usize);
         for k in 0..z {
             for j in 0..y {
                 let row = (k / BRICK * by + j / BRICK) * bx;

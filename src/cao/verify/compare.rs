@@ -47,6 +47,7 @@ impl Compare {
         expected: &Image,
         actual: &Image,
     ) -> Result<Difference> {
+        field.countable()?;
         let bytes = size_of::<kernel::Difference>() as u64;
         let difference = gpu.buffer("difference", bytes, BufferUse::Device)?;
         let read_back = gpu.buffer("difference read-back", bytes, BufferUse::Readback)?;

@@ -1,7 +1,7 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in [`cao_cli::args`].
 
 use anyhow::{Context, Result};
-pub use cao_cli::args::{Global, Raw, Settings, has_extension, open, setup, shape, usage};
+pub use cao_cli::args::{Global, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
 use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
 use cao_formats::printable;
 use cao_measure::stability::Trial;

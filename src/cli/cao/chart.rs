@@ -4,7 +4,7 @@ use crate::args::{self, Chart as Args, Global, usage};
 use anyhow::{Context, Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
-use cao_formats::{input, printable};
+use cao_formats::printable;
 use cao_measure::chart;
 use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{Chart, Plan, Scene, csv, draw, report};
@@ -70,7 +70,7 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
 }
 
 fn read_peers(path: &Path) -> Result<Peers> {
-    let text = input::read_to_string(path).with_context(|| format!("cannot read {}", printable(path)))?;
+    let text = cao_formats::file::read_text(path)?;
     Peers::parse(&text).with_context(|| printable(path))
 }
 
@@ -125,11 +125,12 @@ fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };
-    let volume = args::open(&described.volume, name)?;
+    let mut volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
     let transfer = match &args.transfer {
-        Some(spec) => cao_formats::transfer::load(spec, volume.range())?,
-        None => described.transfer(volume.range())?,
+        Some(spec) => cao_formats::transfer::load(spec, volume.range()),
+        None => described.transfer(volume.range()),
     };
+    let transfer = args::transfer(transfer, &mut volume, name)?;
     let resolved = described.occlusion.setup(volume.min_spacing())?.occlusion;
     let clips = match described.clips.is_empty() {
         true => vec![Scene::default_clip(&volume)],

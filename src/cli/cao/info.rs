@@ -28,6 +28,10 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
     }
     out.line(format!("rescale   stored * {} + {}", volume.slope, volume.intercept));
     out.line(format!("values    {low} ... {high}"));
+    let none = (0..volume.len()).filter(|i| !volume.value(*i).is_finite()).count();
+    if none > 0 {
+        out.line(format!("no number {none} voxels"));
+    }
     let bins = histogram(&volume, low, high);
     let most = bins.iter().copied().max().unwrap_or(1).max(1) as f64;
     for (i, &count) in bins.iter().enumerate() {
@@ -46,6 +50,7 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
         "intercept": volume.intercept,
         "smallest": low,
         "largest": high,
+        "no_number": none,
         "histogram": bins,
     }));
     out.finish()?;
@@ -61,8 +66,10 @@ fn histogram(volume: &Volume, low: f64, high: f64) -> Vec<u64> {
     let mut bins = vec![0; BINS];
     let scale = if high > low { BINS as f64 / (high - low) } else { 0.0 };
     for i in 0..volume.len() {
-        let bin = ((volume.value(i) - low) * scale) as usize;
-        bins[bin.min(BINS - 1)] += 1;
+        let value = volume.value(i);
+        if value.is_finite() {
+            bins[(((value - low) * scale) as usize).min(BINS - 1)] += 1;
+        }
     }
     bins
 }

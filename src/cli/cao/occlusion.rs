@@ -17,10 +17,11 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut progress = Progress::default();
     let clips = args::clips(matches)?;
     progress.stage("reading");
-    let volume = args.raw.open(&args.input)?;
+    let mut volume = args.raw.open(&args.input)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
-    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range());
+    let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;

@@ -31,11 +31,12 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
     override_scene(&mut scene, args, matches)?;
-    let volume = args::open(&scene.volume, &args.input)?;
+    let mut volume = args::open(&scene.volume, args.raw.choices.or(scene.reading), &args.input)?;
     let transfer = match &args.settings.transfer {
-        Some(spec) => cao_formats::transfer::load(spec, volume.range())?,
-        None => scene.transfer(volume.range())?,
+        Some(spec) => cao_formats::transfer::load(spec, volume.range()),
+        None => scene.transfer(volume.range()),
     };
+    let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
     let look = scene.look;
     if !look.occluded {

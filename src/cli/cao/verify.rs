@@ -34,9 +34,10 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     // All of them before the device works for minutes on the first.
     let mut inputs = Vec::new();
     for name in names {
-        let volume = args.raw.open(name)?;
+        let mut volume = args.raw.open(name)?;
         let transfer = args.settings.transfer.as_deref().unwrap_or(OsStr::new("auto"));
-        let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+        let transfer = cao_formats::transfer::load(transfer, volume.range());
+        let transfer = args::transfer(transfer, &mut volume, name)?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
         inputs.push((printable(name), volume, setups, transfer));

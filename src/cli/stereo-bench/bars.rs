@@ -336,7 +336,7 @@ fn clip_ratio(gpu: &Gpu, scene: &Scene, places: [Vec3; 2], what: &str, bar: Bar)
         times[0].push(update(&mut renderer, &mut anew)?.device);
         let clip = scene.sphere(places[(run + 1) % 2]);
         times[1].push(update(&mut renderer, &mut |r| Ok(r.set_clips(std::slice::from_ref(&clip))?))?.device);
-        touched = f64::from(renderer.categories()?.affected) / scene.volume.len() as f64;
+        touched = renderer.categories()?.affected as f64 / scene.volume.len() as f64;
     }
     let [full, moved] = [median(&times[0]), median(&times[1])];
     let note = format!("{full:.1} against {moved:.1} ms, {:.1} % of all voxels recomputed", 100.0 * touched);

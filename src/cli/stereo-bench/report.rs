@@ -31,8 +31,8 @@ fn affected(measured: &Measured) -> f64 {
     let (mut some, mut all) = (0.0, 0.0);
     for frame in measured.frames() {
         let c = frame.categories;
-        some += f64::from(c.affected);
-        all += f64::from(c.clipped) + f64::from(c.affected) + f64::from(c.untouched);
+        some += c.affected as f64;
+        all += c.clipped as f64 + c.affected as f64 + c.untouched as f64;
     }
     some / f64::max(all, 1.0)
 }

@@ -5,7 +5,7 @@ use super::frames::{Configuration, Input, Measured, Plan, measure};
 use super::path::PERIOD;
 use super::{csv, machine, report, save};
 use anyhow::{Context, Result};
-use cao_cli::args::{open, setup, shape, usage};
+use cao_cli::args::{self, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_formats::printable;
@@ -161,11 +161,12 @@ fn plan(cli: &Cli) -> Result<Plan> {
 }
 
 fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {
-    let volume = open(&cli.raw.source(&cli.input)?, &cli.input)?;
+    let mut volume = cli.raw.open(&cli.input)?;
     // A rule asks for a method that has it; other methods take their own.
     let method = cli.settings.quadrature.map_or(Method::Cao, |rule| Method::for_rule(Some(rule)));
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
-    let transfer = cao_formats::transfer::load(transfer, volume.range())?;
+    let transfer = cao_formats::transfer::load(transfer, volume.range());
+    let transfer = args::transfer(transfer, &mut volume, &cli.input)?;
     let input = Rc::new(Input { name: printable(&cli.input), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }

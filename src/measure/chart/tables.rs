@@ -122,7 +122,7 @@ pub(super) fn table_2(chart: &Chart) -> String {
     for scene in &chart.scenes {
         let [x, y, z] = scene.dims;
         let c = scene.categories;
-        let all = f64::from(c.clipped) + f64::from(c.affected) + f64::from(c.untouched);
+        let all = c.clipped as f64 + c.affected as f64 + c.untouched as f64;
         let smallest = scene.spacing.into_iter().fold(f64::INFINITY, f64::min);
         let samples = (f64::from(scene.radius_mm) / smallest).round();
         rows.push(vec![
@@ -130,8 +130,8 @@ pub(super) fn table_2(chart: &Chart) -> String {
             format!("{x} × {y} × {z}"),
             escaped(&scene.clips),
             samples.to_string(),
-            format!("{:.2}", 100.0 * f64::from(c.affected) / all),
-            format!("{:.2}", 100.0 * f64::from(c.clipped) / all),
+            format!("{:.2}", 100.0 * c.affected as f64 / all),
+            format!("{:.2}", 100.0 * c.clipped as f64 / all),
             format!("{:.1}", 100.0 * scene.recomputed),
         ]);
     }
