@@ -28,11 +28,11 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
     }
     out.line(format!("rescale   stored * {} + {}", volume.slope, volume.intercept));
     out.line(format!("values    {low} ... {high}"));
-    let none = (0..volume.len()).filter(|i| !volume.value(*i).is_finite()).count();
+    let bins = histogram(&volume, low, high);
+    let none = volume.len() as u64 - bins.iter().sum::<u64>();
     if none > 0 {
         out.line(format!("no number {none} voxels"));
     }
-    let bins = histogram(&volume, low, high);
     let most = bins.iter().copied().max().unwrap_or(1).max(1) as f64;
     for (i, &count) in bins.iter().enumerate() {
         // Logarithmic, or air would be all there is to see.
