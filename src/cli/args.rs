@@ -148,7 +148,7 @@ pub fn open(source: &VolumeSource, input: &str) -> Result<Volume> {
 /// An analytic shape or a mesh file.
 pub fn shape(name: &str) -> Result<Shape> {
     if name.to_lowercase().ends_with(".obj") {
-        let mesh = cao_formats::obj::load(Path::new(name))?.outward()?;
+        let mesh = cao_formats::obj::load_solid(Path::new(name))?;
         return Ok(Shape::Mesh(Arc::new(mesh)));
     }
     Shape::parse(name).map_err(|error| usage(error.to_string()))

@@ -11,6 +11,7 @@ mod nrrd;
 pub mod obj;
 mod payload;
 pub mod picture;
+mod polygon;
 mod raw;
 pub mod scene;
 mod text;

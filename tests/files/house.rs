@@ -50,7 +50,7 @@ const CRATES: &[Crate] = &[
         "src/formats",
         "cao-formats",
         &["cao-model"],
-        &["flate2", "glam", "image", "serde", "thiserror", "tobj", "toml"],
+        &["earcut", "flate2", "glam", "image", "serde", "thiserror", "tobj", "toml"],
     ),
     // The truth: it must not share code with what it judges, but sizes and codes are said once, in the kernels.
     uses("src/twin", "cao-twin", &["cao-kernels", "cao-model"], &["glam"]),
@@ -197,7 +197,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/toml_value.rs", &["error"]),
     ("src/formats/write.rs", &["error"]),
     ("src/formats/picture.rs", &["error", "write"]),
-    ("src/formats/obj.rs", &["error"]),
+    ("src/formats/polygon.rs", &[]),
+    ("src/formats/obj.rs", &["error", "polygon"]),
     ("src/formats/transfer.rs", &["error", "toml_value"]),
     ("src/formats/scene.rs", &["error", "obj", "toml_value", "transfer"]),
     // The readers of volumes, and what refuses and assembles for all of them.
@@ -273,10 +274,11 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 9] = [
+const ONLY_IN: [(&str, &[&str]); 10] = [
     ("ash", &["src/gpu/"]),
     ("gpu_allocator", &["src/gpu/"]),
     ("tobj", &["src/formats/obj.rs"]),
+    ("earcut", &["src/formats/polygon.rs"]),
     ("kuva", &["src/measure/plot.rs"]),
     ("clap", &["src/cli/"]),
     ("anyhow", &["src/cli/"]),
