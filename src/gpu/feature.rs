@@ -119,6 +119,11 @@ pub const FORMATS: &[FormatNeed] = &[
     FormatNeed { format: vk::Format::R8_UINT, features: flags(&[SAMPLED, STORAGE]), why: "masks" },
     FormatNeed { format: vk::Format::R32G32B32A32_SFLOAT, features: COLOUR, why: "pictures" },
     FormatNeed {
+        format: vk::Format::R32_UINT,
+        features: flags(&[COLOUR, SAMPLED]),
+        why: "faces of clip meshes",
+    },
+    FormatNeed {
         format: vk::Format::D32_SFLOAT,
         features: flags(&[vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT, SAMPLED]),
         why: "depth",
@@ -137,6 +142,13 @@ pub(crate) fn stores(instance: &ash::Instance, device: vk::PhysicalDevice, forma
     // SAFETY: `device` was enumerated from `instance`.
     let has = unsafe { instance.get_physical_device_format_properties(device, format) };
     has.optimal_tiling_features.contains(STORAGE)
+}
+
+/// Whether drawing to images of this format, with optimal tiling, can blend.
+pub(crate) fn blends(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
+    // SAFETY: `device` was enumerated from `instance`.
+    let has = unsafe { instance.get_physical_device_format_properties(device, format) };
+    has.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
 }
 
 /// Everything that this device lacks, in words; empty for a usable one.

@@ -4,6 +4,7 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod fuzz;
 mod house;
 mod mesh;
 mod scene;
