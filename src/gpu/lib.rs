@@ -14,8 +14,8 @@
 //! * Every barrier is one line that names both sides from the table in [`Access`]; [`hazard`] refuses commands that lack one.
 //! * Objects are freed when dropped, after the recorders that used them: a [`Recorder`] keeps what it refers to alive.
 //! * What a device must have is the table in [`feature`].
-//! * Safe functions let nothing through that Vulkan leaves undefined; what only a promise can rule out is `unsafe`: a host's handles,
-//!   and code for the device ([`Shader::new`]).
+//! * Safe functions refuse calls that Vulkan leaves undefined; what only a promise can rule out is `unsafe`: a host's handles, and code
+//!   for the device with what it does on the numbers that it is given ([`Shader::new`]).
 
 mod access;
 mod bind;

@@ -12,8 +12,9 @@ impl Shader {
     ///
     /// # Safety
     /// `shader` must be what `cao_compile` made of one WGSL file: SPIR-V valid for Vulkan 1.3 and the features of [`feature`](crate::feature),
-    /// and reflection of that code. Its entry points must stay within the buffers that are bound to them, whatever is in these, as long as
-    /// each has [`Binding::min_bytes`] and its lists the room that they say, end, and write to indirect arguments at most 65535.
+    /// and reflection of that code. Given the numbers that its host side gives it (sizes in immediates, indices in lists), each entry point
+    /// must end, stay within what is bound to it, and count indirect arguments up to 65535 at most. The build checks none of these: bounds are
+    /// checked in a build for tests only.
     pub const unsafe fn new(shader: cao_reflect::Shader) -> Self {
         Self(shader)
     }
