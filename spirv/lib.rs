@@ -11,7 +11,7 @@
 //!
 //! What several kernels include is in [`shared`], and re-exported by each of them.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 #![allow(clippy::approx_constant, reason = "a kernel's constants are the kernel's, digit by digit")]
 
 use cao_gpu as gpu;

@@ -21,7 +21,7 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
         if variable.space == AddressSpace::Immediate {
             push = Some((handle, layouter[variable.ty].size));
         }
-        if let Some(binding) = binding(module, variable)? {
+        if let Some(binding) = binding(module, variable, layouter[variable.ty].size)? {
             bindings.push((handle, binding));
         }
     }
@@ -67,7 +67,7 @@ pub fn reflect(name: &str, module: &Module, info: &ModuleInfo, spirv: Vec<u32>) 
     })
 }
 
-fn binding(module: &Module, variable: &GlobalVariable) -> Result<Option<Binding>, String> {
+fn binding(module: &Module, variable: &GlobalVariable, bytes: u32) -> Result<Option<Binding>, String> {
     let Some(at) = variable.binding else { return Ok(None) };
     let name = variable.name.clone().unwrap_or_default();
     let refuse = |problem: &str| Err(format!("binding `{name}`: {problem}"));
@@ -107,6 +107,7 @@ fn binding(module: &Module, variable: &GlobalVariable) -> Result<Option<Binding>
         group: at.group,
         binding: at.binding,
         kind,
+        min_bytes: if matches!(kind, BindingKind::Uniform | BindingKind::Storage) { bytes } else { 0 },
         image,
         reads: false,
         writes: false,

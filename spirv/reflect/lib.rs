@@ -1,5 +1,6 @@
 //! What is known about a compiled kernel: its code, entry points and bindings. `cao-compile` fills these types from the WGSL, the
-//! Vulkan layer builds pipelines from them; nothing in them is written by hand.
+//! Vulkan layer builds pipelines from them; nothing in them is written by hand. What is written by hand the Vulkan layer does not take:
+//! its own `Shader` around these is made by a promise.
 
 #![forbid(unsafe_code)]
 
@@ -77,6 +78,8 @@ pub struct Binding {
     pub binding: u32,
     /// What kind of resource it takes.
     pub kind: BindingKind,
+    /// Least bytes of a buffer: the whole struct, with one element of an array of run-time size; 0 for images and samplers.
+    pub min_bytes: u32,
     /// What kind of image it takes; `None` for buffers and samplers.
     pub image: Option<ImageBinding>,
     /// Some entry point reads it.

@@ -6,6 +6,9 @@ const EMPTY = 1.0;
 const NO_FRONT = 2.0;
 const NO_BACK = -1.0;
 
+// Depths that are less apart than this are one: what f32 plane equations over the whole map leave of faces that touch.
+const ONE_DEPTH = 4e-6;
+
 // Pixels along the edge of a block of layers.
 const BLOCK = 16u;
 // What is kept of each block and pair, in this order: nearest front and farthest back (NO_FRONT and NO_BACK where nothing is

@@ -203,7 +203,7 @@ pub fn transfer(
 /// An analytic shape or a mesh file.
 pub fn shape(name: &OsStr) -> Result<Shape> {
     if has_extension(name, "obj") {
-        let mesh = cao_formats::obj::load(Path::new(name))?.outward()?;
+        let mesh = cao_formats::obj::load_solid(Path::new(name))?;
         return Ok(Shape::Mesh(Arc::new(mesh)));
     }
     Shape::parse(&name.to_string_lossy()).map_err(|error| usage(error.to_string()))

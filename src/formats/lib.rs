@@ -17,6 +17,7 @@ mod outputs;
 mod parts;
 mod payload;
 pub mod picture;
+mod polygon;
 mod raw;
 mod reading;
 pub mod scene;

@@ -1,7 +1,7 @@
 //! Wavefront OBJ: the triangles of clip meshes.
 
 use crate::error::printable;
-use crate::{Result, file};
+use crate::{Result, file, polygon};
 use cao_model::error::quoted;
 use cao_model::mesh::TriangleMesh;
 use glam::Vec3;
@@ -12,15 +12,25 @@ use std::path::Path;
 const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads a Wavefront OBJ file: all objects of the file as one mesh. Faces with more than three corners become
-/// triangle fans; points, lines, normals, texture coordinates, colours and materials are ignored.
+/// triangles, concave ones too; points, lines, normals, texture coordinates, colours and materials are ignored.
 ///
 /// # Errors
-/// [`Error::Io`](crate::Error::Io) when the file cannot be read, [`Error::File`](crate::Error::File) when it is longer than 256 MiB, [`cao_model::Error::Mesh`] naming the file (and the line where there is one)
-/// when it is not an OBJ file, has no faces, or has coordinates that are not finite.
+/// [`Error::Io`](crate::Error::Io) when the file cannot be read, [`Error::File`](crate::Error::File) when it is longer than 256 MiB, [`cao_model::Error::Mesh`] naming the file
+/// (and the line where there is one) when it is not an OBJ file, has no faces, one that crosses itself, or coordinates that are not finite.
 pub fn load(path: &Path) -> Result<TriangleMesh> {
     let name = printable(path);
     let bytes = file::read_bytes(path, MAX_BYTES)?;
     parse(name, &String::from_utf8_lossy(&bytes))
+}
+
+/// As [`load`], a mesh that can clip.
+///
+/// # Errors
+/// As [`load`] and [`TriangleMesh::check_solid`].
+pub fn load_solid(path: &Path) -> Result<TriangleMesh> {
+    let mesh = load(path)?;
+    mesh.check_solid()?;
+    Ok(mesh)
 }
 
 /// As [`load`], from the text of an OBJ file; `name` stands for the file in errors.
@@ -31,12 +41,7 @@ pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
     let name = name.into();
     let geometry = geometry_lines(text);
     let mut reader = Cursor::new(geometry.as_bytes());
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // Materials are never asked for: `geometry_lines` leaves no line that names one.
     let read = tobj::load_obj_buf(&mut reader, &options, |_| Err(tobj::LoadError::GenericFailure));
     let models = match read {
@@ -57,10 +62,27 @@ pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
     };
     let mut positions = Vec::new();
     let mut faces = Vec::new();
+    // One and two corners are points and lines, which tobj leaves out.
+    let is_face = |line: &str| line.starts_with('f') && !matches!(line.split(' ').count(), 2 | 3);
+    let mut lines = geometry.lines().zip(1..).filter(|(line, _)| is_face(line));
     for tobj::Model { mesh, .. } in &models {
         let first = positions.len() as u32;
         positions.extend(mesh.positions.chunks_exact(3).map(Vec3::from_slice));
-        faces.extend(mesh.indices.chunks_exact(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
+        // No arities: all faces are triangles.
+        let triangles = vec![3; mesh.indices.len() / 3];
+        let arities = if mesh.face_arities.is_empty() { &triangles } else { &mesh.face_arities };
+        let mut rest = mesh.indices.as_slice();
+        for &arity in arities {
+            let (face, after) = rest.split_at((arity as usize).min(rest.len()));
+            rest = after;
+            let corners: Vec<Vec3> = face.iter().map(|&v| positions[(first + v) as usize]).collect();
+            let line = lines.next().map_or(0, |(_, line)| line);
+            let triangles = polygon::triangles(&corners).map_err(|problem| cao_model::Error::Mesh {
+                name: name.clone(),
+                problem: format!("line {line}: {problem}"),
+            })?;
+            faces.extend(triangles.iter().map(|t| t.map(|corner| first + face[corner])));
+        }
     }
     Ok(TriangleMesh::new(name, &positions, &faces)?)
 }

@@ -90,7 +90,7 @@ pub struct Scene {
     pub reading: Reading,
     /// Where opacity and colour come from; see [`Scene::transfer`].
     pub transfer: TransferSource,
-    /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are closed and face outward.
+    /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are solids.
     pub clips: Vec<Clip>,
     /// Ambient occlusion; see [`OcclusionSettings::setup`].
     pub occlusion: OcclusionSettings,
@@ -304,8 +304,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Io`] when it cannot be read; [`Error::File`] naming file, key, what was found and what would do; the
-    /// errors of [`obj::load`], [`TriangleMesh::outward`](cao_model::mesh::TriangleMesh::outward) and [`transfer::load`] for files it
-    /// names.
+    /// errors of [`obj::load_solid`] and [`transfer::load`] for files it names.
     pub fn load(path: &Path) -> Result<Self> {
         let text = file::read_text(path)?;
         Self::from_toml(&text, path.parent().unwrap_or(Path::new("."))).map_err(|error| error.in_file(path))
@@ -547,7 +546,7 @@ impl ClipFile {
             }
             (None, Some(path)) => {
                 let path = existing(&format!("{key}.mesh"), base, path)?;
-                Shape::Mesh(Arc::new(obj::load(&path)?.outward()?))
+                Shape::Mesh(Arc::new(obj::load_solid(&path)?))
             }
             _ => return Err(Error::refused(key, "expected either shape or mesh")),
         };

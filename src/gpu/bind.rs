@@ -212,6 +212,13 @@ fn buffer_range<'a>(
             hint: "bind a part of it, or work on smaller bricks".into(),
         });
     }
+    let least = slot.binding.min_bytes;
+    if size < least.into() {
+        return Ok(Err(format!(
+            "is given {size} bytes of buffer {}, the shader takes at least {least}",
+            buffer.name()
+        )));
+    }
     if buffer.0.kind == super::BufferUse::Readback {
         return Ok(Err(format!("is given buffer {}, which is for reading back only", buffer.name())));
     }

@@ -8,7 +8,7 @@ use super::{
     idle::Idle,
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
-    validation::{LAYER, ValidationLog, enable_submit_time_checks},
+    validation::{LAYER, ValidationLog},
 };
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
@@ -30,7 +30,9 @@ pub struct Gpu(pub(crate) Arc<Inner>);
 pub struct OpenOptions {
     /// Index in [`Gpu::list`] or part of the device's name, any case; else the environment variable `CAO_DEVICE`; else the best.
     pub device: Option<String>,
-    /// Run under the validation layer, with synchronization checks; also on when the environment has `CAO_VALIDATION=1`.
+    /// Run under the validation layer, with synchronization checks; also on when the environment has `CAO_VALIDATION=1`. The layer checks
+    /// across submits only if the environment has `VK_LAYER_ENABLES` as `.cargo/config.toml` sets it, which this never does: other threads
+    /// may be reading the environment.
     pub validation: bool,
 }
 
@@ -134,7 +136,6 @@ impl Instance {
                     problem: "validation was asked for, but its layer is missing; install it, on Debian or Ubuntu `apt install vulkan-validationlayers`".into(),
                 });
             }
-            enable_submit_time_checks();
             layer_names.push(LAYER.as_ptr());
             names.push(vk::EXT_VALIDATION_FEATURES_NAME.as_ptr());
             messenger = log.messenger();

@@ -1,8 +1,12 @@
 //! Drawing into images.
 
 use super::{
-    Format, Image, ImageKind, ImageUse, Pipeline, Recorder, access::Access, bind::Bindings, hazard::Touch,
-    pipeline::Targets, transfer::clear_colour,
+    Format, Image, ImageKind, ImageUse, Pipeline, Recorder,
+    access::Access,
+    bind::Bindings,
+    hazard::Touch,
+    pipeline::Targets,
+    transfer::{clear_colour, clear_depth},
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -12,7 +16,7 @@ use ash::vk;
 pub struct Attachments<'a> {
     /// Colour images, each with the r g b a it is cleared to first, or `None` to keep what it holds.
     pub colours: &'a [(&'a Image, Option<[f32; 4]>)],
-    /// Depth image, with the depth it is cleared to first, or `None` to keep what it holds.
+    /// Depth image, with the depth 0 ... 1 it is cleared to first, or `None` to keep what it holds.
     pub depth: Option<(&'a Image, Option<f32>)>,
     /// The layer to draw to; `None` for the layers of the pipeline's view mask. Images of one layer are drawn to as they are.
     pub layer: Option<u32>,
@@ -57,7 +61,7 @@ impl Recorder {
         if let Some((image, clear)) = attachments.depth {
             let (view, touch) =
                 attachment(targets, image, "depth attachment", &attachments).map_err(refuse)?;
-            let value = vk::ClearDepthStencilValue { depth: clear.unwrap_or_default(), stencil: 0 };
+            let value = clear_depth(image, clear.unwrap_or_default())?;
             depth = Some(info(view, clear.is_some()).clear_value(vk::ClearValue { depth_stencil: value }));
             resolved.touches.push(touch);
             resolved.keep.push(image.0.clone());

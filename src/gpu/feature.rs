@@ -105,6 +105,7 @@ const SAMPLED: vk::FormatFeatureFlags = vk::FormatFeatureFlags::SAMPLED_IMAGE;
 const FILTERED: vk::FormatFeatureFlags =
     flags(&[SAMPLED, vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR]);
 const STORAGE: vk::FormatFeatureFlags = vk::FormatFeatureFlags::STORAGE_IMAGE;
+const COLOUR: vk::FormatFeatureFlags = vk::FormatFeatureFlags::COLOR_ATTACHMENT;
 
 /// Required uses of formats. `R16_UNORM` is optional: not filtered, 16-bit values become f32 texels (`Gpu::filters`); not
 /// filtered and stored, there are no rays by brick (`Gpu::stores`).
@@ -120,6 +121,11 @@ pub const FORMATS: &[FormatNeed] = &[
         format: vk::Format::R32G32B32A32_SFLOAT,
         features: flags(&[SAMPLED, STORAGE]),
         why: "pictures",
+    },
+    FormatNeed {
+        format: vk::Format::R32_UINT,
+        features: flags(&[COLOUR, SAMPLED]),
+        why: "faces of clip meshes",
     },
     FormatNeed {
         format: vk::Format::D32_SFLOAT,
@@ -140,6 +146,13 @@ pub(crate) fn stores(instance: &ash::Instance, device: vk::PhysicalDevice, forma
     // SAFETY: `device` was enumerated from `instance`.
     let has = unsafe { instance.get_physical_device_format_properties(device, format) };
     has.optimal_tiling_features.contains(STORAGE)
+}
+
+/// Whether drawing to images of this format, with optimal tiling, can blend.
+pub(crate) fn blends(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
+    // SAFETY: `device` was enumerated from `instance`.
+    let has = unsafe { instance.get_physical_device_format_properties(device, format) };
+    has.optimal_tiling_features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND)
 }
 
 /// Everything that this device lacks, in words; empty for a usable one.

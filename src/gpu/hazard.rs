@@ -37,6 +37,8 @@ struct State {
     undefined: bool,
     /// Accesses that a later command may still have to be ordered after.
     pending: Vec<Pending>,
+    /// Bytes of a buffer that may be indirect arguments: what the program wrote last there are numbers that every device can dispatch.
+    dispatchable: Vec<Range<u64>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +64,7 @@ impl Hazards {
 
     /// Makes an image known; it must be discarded before it is used.
     pub fn add_image(&mut self, id: ResourceId) {
-        self.resources.insert(id, State { undefined: true, pending: Vec::new() });
+        self.resources.insert(id, State { undefined: true, ..State::default() });
     }
 
     /// Forgets a resource that no longer exists.
@@ -179,11 +181,41 @@ impl Hazards {
         });
     }
 
+    /// Notes that a copy, fill or update writes these bytes of a buffer, with numbers that can be dispatched or with others.
+    pub fn words(&mut self, id: ResourceId, range: Range<u64>, dispatchable: bool) {
+        let Some(state) = self.resources.get_mut(&id) else { return };
+        let mut joined = range.clone();
+        let mut parts = Vec::new();
+        for Range { start, end } in state.dispatchable.drain(..) {
+            parts.extend(
+                [start..end.min(range.start), start.max(range.end)..end]
+                    .into_iter()
+                    .filter(|part| !part.is_empty()),
+            );
+        }
+        if dispatchable {
+            let touch = |part: &Range<u64>| part.end == range.start || part.start == range.end;
+            for part in parts.extract_if(.., |part| touch(part)) {
+                joined = joined.start.min(part.start)..joined.end.max(part.end);
+            }
+            parts.push(joined);
+        }
+        state.dispatchable = parts;
+    }
+
+    /// Whether these bytes may be indirect arguments, as far as the program has written them; what shaders write is theirs to answer for.
+    pub fn may_dispatch(&self, id: ResourceId, range: &Range<u64>) -> bool {
+        self.resources.get(&id).is_some_and(|state| state.dispatchable.iter().any(|part| covers(part, range)))
+    }
+
     /// Takes over what a recorder knows after its commands have run to the end: nothing is pending any more.
     pub fn commit_waited(&mut self, recorded: &Hazards) {
         for (id, state) in &mut self.resources {
             state.pending.clear();
-            state.undefined &= recorded.resources.get(id).is_none_or(|r| r.undefined);
+            if let Some(recorded) = recorded.resources.get(id) {
+                state.undefined &= recorded.undefined;
+                state.dispatchable.clone_from(&recorded.dispatchable);
+            }
         }
     }
 

@@ -14,6 +14,8 @@
 //! * Every barrier is one line that names both sides from the table in [`Access`]; [`hazard`] refuses commands that lack one.
 //! * Objects are freed when dropped, after the recorders that used them: a [`Recorder`] keeps what it refers to alive.
 //! * What a device must have is the table in [`feature`].
+//! * Safe functions refuse calls that Vulkan leaves undefined; what only a promise can rule out is `unsafe`: a host's handles, and code
+//!   for the device with what it does on the numbers that it is given ([`Shader::new`]).
 
 mod access;
 mod bind;
@@ -31,17 +33,14 @@ mod info;
 mod memory;
 mod pipeline;
 mod recorder;
+pub mod shader;
 mod timing;
 mod transfer;
 mod validation;
 
-/// What is known about a compiled shader.
-pub use cao_reflect as shader;
-
 pub use access::Access;
 pub use bind::{Bind, Bindings, Flat};
 pub use buffer::{Buffer, BufferUse};
-pub use cao_reflect::Shader;
 pub use counts::Counts;
 pub use device::{Adopted, Gpu, OpenOptions};
 pub use draw::Attachments;
@@ -51,6 +50,7 @@ pub use image::{Image, ImageDesc, ImageKind, ImageUse, Sampler, SamplerDesc};
 pub use info::{DeviceInfo, DeviceKind};
 pub use pipeline::{Blend, Cull, DepthTest, GraphicsDesc, Pipeline};
 pub use recorder::Recorder;
+pub use shader::Shader;
 pub use timing::{Phase, Recorded, Stage, Timing, Timings};
 pub use validation::ValidationLog;
 

@@ -4,6 +4,7 @@ use super::{
     Gpu,
     device::{Inner, vulkan},
     draw::COLOURS,
+    feature,
     format::{Format, VulkanFormat},
     shader::{Binding, BindingKind, EntryPoint, Shader, Stage},
 };
@@ -69,7 +70,7 @@ pub struct GraphicsDesc<'a> {
 }
 
 impl Default for GraphicsDesc<'_> {
-    /// No attachment, no depth test, all faces, no blending.
+    /// No attachment yet, no depth test, all faces, no blending.
     fn default() -> Self {
         Self {
             vertex: "",
@@ -155,13 +156,13 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Config`] if the shader has no such entry points, writes buffers or images while drawing, or the description contradicts
-    /// itself; [`Error::Vulkan`] if the driver refuses.
+    /// itself, has no attachment or blends into a format that cannot; [`Error::Vulkan`] if the driver refuses.
     pub fn graphics(&self, shader: &'static Shader, desc: &GraphicsDesc<'_>) -> Result<Pipeline> {
         let gpu = &self.0;
         let vertex = entry_point(shader, desc.vertex, Stage::Vertex)?;
         let fragment = entry_point(shader, desc.fragment, Stage::Fragment)?;
         let name = format!("{}.{}+{}", shader.name, desc.vertex, desc.fragment);
-        check_graphics(&name, desc)?;
+        check_graphics(gpu, &name, desc)?;
         let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         let mut pipeline = layout(gpu, name, shader, &[vertex, fragment], stages)?;
         if let Some(slot) = pipeline.slots.iter().find(|slot| slot.writes) {
@@ -251,8 +252,24 @@ fn entry_point(shader: &'static Shader, name: &str, stage: Stage) -> Result<&'st
 /// Most views of one pass, which every device of Vulkan 1.3 has.
 const MAX_VIEWS: u32 = 6;
 
-fn check_graphics(name: &str, desc: &GraphicsDesc<'_>) -> Result<()> {
-    let problem = if desc.depth.is_none() && (desc.depth_write || desc.depth_test != DepthTest::Always) {
+fn check_graphics(gpu: &Inner, name: &str, desc: &GraphicsDesc<'_>) -> Result<()> {
+    let blends = |format: &Format| feature::blends(&gpu.instance, gpu.physical, format.vk());
+    let unblended = match desc.blend {
+        Blend::None => None,
+        Blend::Premultiplied => desc.colours.iter().find(|format| !blends(format)),
+    };
+    if let Some(format) = unblended {
+        return Err(Error::Config {
+            what: name.into(),
+            problem: format!(
+                "blends into {format:?}, which {} cannot; draw to a format that blends",
+                gpu.info.name
+            ),
+        });
+    }
+    let problem = if desc.colours.is_empty() && desc.depth.is_none() {
+        "draws to nothing; it needs a colour or a depth attachment"
+    } else if desc.depth.is_none() && (desc.depth_write || desc.depth_test != DepthTest::Always) {
         "tests or writes depth but has no depth attachment"
     } else if desc.colours.iter().any(|c| c.aspect() != vk::ImageAspectFlags::COLOR) {
         "has a depth format among its colour attachments"
@@ -359,7 +376,7 @@ struct Module<'a> {
 impl<'a> Module<'a> {
     fn new(gpu: &'a Inner, shader: &Shader) -> Result<Self> {
         let create = vk::ShaderModuleCreateInfo::default().code(shader.spirv);
-        // SAFETY: the code comes from naga, which validated it; the device has the capabilities of the feature table.
+        // SAFETY: the code is valid by the promise of `Shader::new`; the device has the capabilities of the feature table.
         let raw = unsafe { gpu.device.create_shader_module(&create, None) }
             .map_err(vulkan("vkCreateShaderModule", shader.name))?;
         gpu.set_name(raw, shader.name);

@@ -6,13 +6,16 @@ use super::{
     bind::{Bind, Bindings, Keep, Resolved, resolve},
     counts::Counts,
     device::{Inner, vulkan},
-    hazard::{Hazards, Touch},
+    hazard::{Hazards, ResourceId, Touch},
     idle::{Commands, Idle},
     timing::{Recorded, Stage, Stages, Timings},
 };
 use crate::{Error, Result};
 use ash::vk;
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
+
+/// Bytes of indirect arguments.
+const ARGUMENTS: u64 = 12;
 
 /// Records commands. Keeps everything they refer to alive. See [`hazard`](super::hazard) for what it refuses.
 pub struct Recorder {
@@ -71,7 +74,9 @@ impl Gpu {
     ///
     /// # Safety
     /// `cmd` must belong to this device and be recording, for a queue of the adopted family, outside a rendering pass, until
-    /// [`Recorder::finish`] returns. The host must submit it at most once, and keep the [`Recorded`] until the device has run it.
+    /// [`Recorder::finish`] returns. The host must submit it at most once, and keep the [`Recorded`] until the device has run it. Where
+    /// recording ended in another way, with an error or a recorder that was dropped without [`Recorder::finish`], the host must not submit
+    /// `cmd`: reset it. Its commands refer to what nothing keeps alive, and later recordings do not know of them.
     pub unsafe fn record_into(&self, cmd: vk::CommandBuffer) -> Recorder {
         self.record("host's commands", cmd, None)
     }
@@ -190,7 +195,8 @@ impl Recorder {
     /// Runs as many workgroups as the three `u32` at `offset` (bytes) of `buffer` say when the device gets there.
     ///
     /// # Errors
-    /// As [`dispatch`](Self::dispatch); [`Error::Config`] if the arguments are not inside a device buffer.
+    /// As [`dispatch`](Self::dispatch); [`Error::Config`] if the arguments are not inside a device buffer, or if a fill or update with
+    /// numbers of at most 65535, which every device can run, is not what the program last wrote there. Shaders may count up from that.
     pub fn dispatch_indirect(
         &mut self,
         pipeline: &Pipeline,
@@ -199,7 +205,7 @@ impl Recorder {
         buffer: &Buffer,
         offset: u64,
     ) -> Result<()> {
-        buffer.0.check_range(offset, 12)?;
+        buffer.0.check_range(offset, ARGUMENTS)?;
         if buffer.0.kind != super::BufferUse::Device || !offset.is_multiple_of(4) {
             return Err(Error::Config {
                 what: format!(
@@ -210,13 +216,25 @@ impl Recorder {
                 problem: "must be in a Device buffer at a multiple of 4".into(),
             });
         }
+        self.hazards.learn(&self.gpu.hazards(), buffer.0.id);
+        if !self.hazards.may_dispatch(buffer.0.id, &(offset..offset + ARGUMENTS)) {
+            return Err(Error::Config {
+                what: format!(
+                    "{}: indirect arguments in buffer {} at {offset}",
+                    pipeline.0.name,
+                    buffer.name()
+                ),
+                problem: "may be anything; write the three counts with fill or update, each at most 65535, before shaders count them up"
+                    .into(),
+            });
+        }
         let binds = binds.list();
         let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::COMPUTE, &binds, push)?;
         resolved.touches.push(Touch {
             id: buffer.0.id,
             name: buffer.name(),
             via: "indirect arguments",
-            range: offset..offset + 12,
+            range: offset..offset + ARGUMENTS,
             access: Access::IndirectRead,
         });
         resolved.keep.push(buffer.0.clone());
@@ -321,12 +339,15 @@ impl Recorder {
 
     /// Refuses a command that lacks a barrier, or notes what it does.
     pub(crate) fn order(&mut self, command: &str, touches: &[Touch<'_>]) -> Result<()> {
-        let gpu = self.gpu.hazards();
-        touches.iter().for_each(|touch| self.hazards.learn(&gpu, touch.id));
-        drop(gpu);
+        touches.iter().for_each(|touch| self.hazards.learn(&self.gpu.hazards(), touch.id));
         self.counts.commands += 1;
         self.counts.calls += 1;
         self.hazards.command(command, touches).map_err(|problem| Error::Hazard { problem })
+    }
+
+    /// Notes what the program writes to a buffer, see [`Hazards::words`].
+    pub(crate) fn note_words(&mut self, id: ResourceId, range: Range<u64>, dispatchable: bool) {
+        self.hazards.words(id, range, dispatchable);
     }
 
     /// Keeps an object until the commands have run.

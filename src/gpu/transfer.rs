@@ -12,6 +12,9 @@ use crate::{Error, Result};
 use ash::vk;
 use std::ops::Range;
 
+/// Most workgroups along an axis that every device can run at once.
+const MOST_GROUPS: u32 = 65535;
+
 /// Most bytes of one vkCmdUpdateBuffer.
 const UPDATE_BYTES: usize = 65536;
 
@@ -62,6 +65,8 @@ impl Recorder {
         buffer.0.check_range(offset, size)?;
         check_multiple_of_four(buffer, offset, size)?;
         self.order("update", &[target(buffer, offset..offset + size)])?;
+        let small = data.chunks_exact(4).all(|word| bytemuck::pod_read_unaligned::<u32>(word) <= MOST_GROUPS);
+        self.note_words(buffer.0.id, offset..offset + size, small);
         self.keep(buffer.0.clone());
         let mut at = offset;
         for part in data.chunks(UPDATE_BYTES) {
@@ -81,6 +86,7 @@ impl Recorder {
         buffer.0.check_range(offset, size)?;
         check_multiple_of_four(buffer, offset, size)?;
         self.order("fill", &[target(buffer, offset..offset + size)])?;
+        self.note_words(buffer.0.id, offset..offset + size, value <= MOST_GROUPS);
         self.keep(buffer.0.clone());
         // SAFETY: `cmd` is recording, the range is inside the buffer, which is kept.
         unsafe { self.gpu.device.cmd_fill_buffer(self.cmd, buffer.0.raw, offset, size, value) };
@@ -109,6 +115,7 @@ impl Recorder {
         let touches =
             [source(from, from_offset..from_offset + size), target(to, to_offset..to_offset + size)];
         self.order("copy_buffer", &touches)?;
+        self.note_words(to.0.id, to_offset..to_offset + size, false);
         self.keep(from.0.clone());
         self.keep(to.0.clone());
         let region = [vk::BufferCopy { src_offset: from_offset, dst_offset: to_offset, size }];
@@ -178,6 +185,7 @@ impl Recorder {
             target(buffer, offset..offset + bytes),
         ];
         self.order("copy_image_to_buffer", &touches)?;
+        self.note_words(buffer.0.id, offset..offset + bytes, false);
         self.keep(buffer.0.clone());
         self.keep(image.0.clone());
         // SAFETY: `cmd` is recording, the box is inside the image and its bytes inside the buffer, both are kept.
@@ -221,11 +229,15 @@ impl Recorder {
         Ok(())
     }
 
-    /// Sets every texel: r g b a for colours (rounded for integer formats), the first number for depth.
+    /// Sets every texel: r g b a for colours (rounded for integer formats), the first number, 0 ... 1, for depth.
     ///
     /// # Errors
-    /// [`Error::Hazard`] for a missing barrier.
+    /// [`Error::Config`] for another depth, [`Error::Hazard`] for a missing barrier.
     pub fn clear_image(&mut self, image: &Image, value: [f32; 4]) -> Result<()> {
+        let depth = match image.desc().format.texel() {
+            Texel::Depth => clear_depth(image, value[0])?,
+            _ => vk::ClearDepthStencilValue::default(),
+        };
         let all = 0..image.desc().layers;
         self.order("clear_image", &[layers(image, "target", all, Access::TransferWrite)])?;
         self.keep(image.0.clone());
@@ -235,8 +247,7 @@ impl Recorder {
         unsafe {
             match image.desc().format.texel() {
                 Texel::Depth => {
-                    let value = vk::ClearDepthStencilValue { depth: value[0], stencil: 0 };
-                    device.cmd_clear_depth_stencil_image(self.cmd, image.0.raw, layout, &value, &range);
+                    device.cmd_clear_depth_stencil_image(self.cmd, image.0.raw, layout, &depth, &range);
                 }
                 texel => {
                     let value = clear_colour(texel, value);
@@ -246,6 +257,17 @@ impl Recorder {
         }
         Ok(())
     }
+}
+
+/// A depth to clear to. Vulkan knows none outside 0 ... 1.
+pub(crate) fn clear_depth(image: &Image, depth: f32) -> Result<vk::ClearDepthStencilValue> {
+    if (0.0..=1.0).contains(&depth) {
+        return Ok(vk::ClearDepthStencilValue { depth, stencil: 0 });
+    }
+    refuse(
+        format!("image {}", image.name()),
+        format!("is cleared to depth {depth}; a depth is within 0 ... 1"),
+    )
 }
 
 /// A clear value in the format's own number type.

@@ -4,7 +4,7 @@ use crate::{Error, Result};
 use ash::vk;
 use std::{
     ffi::{CStr, c_void},
-    sync::{Arc, Mutex, Once, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 /// The layer.
@@ -70,22 +70,6 @@ impl ValidationLog {
     }
 }
 
-/// Switches on the check across submits, which this layer's older versions (1.3.239) know only as an environment variable: without it a
-/// missing barrier between two submits goes unseen.
-pub(crate) fn enable_submit_time_checks() {
-    const KEY: &str = "VK_LAYER_ENABLES";
-    const CHECK: &str = "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT";
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        if std::env::var_os(KEY).is_none() {
-            // SAFETY: the environment must not be read by foreign code at the same time. `Once` orders this before every instance
-            // that this library creates with validation; a host that turns validation on while its own C code reads the
-            // environment in another thread can set the variable itself, and then this is not reached.
-            unsafe { std::env::set_var(KEY, CHECK) };
-        }
-    });
-}
-
 fn keep(messages: &Mutex<Vec<String>>, id: &str, text: &str) {
     if !MUTED.iter().any(|mute| mute.id == id && text.contains(mute.text)) {
         messages.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{id}: {text}"));
@@ -115,7 +99,7 @@ unsafe extern "system" fn receive(
 mod tests {
     use super::*;
 
-    /// Two submits without a barrier between them, which `Recorder` cannot express.
+    /// Two submits without a barrier between them, which `Recorder` cannot express. The layer sees it as `.cargo/config.toml` asks it to.
     #[test]
     fn a_missing_barrier_between_two_submits_is_seen() {
         use crate::{BufferUse, Gpu, OpenOptions};

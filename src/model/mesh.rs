@@ -1,13 +1,14 @@
-//! Triangle meshes that clip a volume: read, weld, check, orient.
+//! Triangle meshes that clip a volume: weld, check.
 //!
 //! A clip mesh has to bound a solid, otherwise "inside" has no meaning and depth peeling cuts somewhere the user
 //! did not ask for. So a mesh is welded on entry (OBJ files split vertices at texture and normal seams), and
-//! [`TriangleMesh::closed`] and [`TriangleMesh::outward`] say what is wrong before a wrong cut can happen.
+//! [`TriangleMesh::check_solid`] says what is wrong before a wrong cut can happen.
 //!
-//! Coordinates are the mesh's own, read as millimetres at scale 1; counter-clockwise triangles face outward.
+//! Coordinates are the mesh's own, read as millimetres at scale 1. The solid is where the winding number is not 0, so
+//! that it does not matter which way the whole faces.
 
 use std::collections::HashMap;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
@@ -20,7 +21,7 @@ pub struct TriangleMesh {
     pub name: String,
     /// Positions in mm at scale 1; every one is used and finite.
     pub vertices: Vec<Vec3>,
-    /// Three vertex indices each, counter-clockwise seen from outside.
+    /// Three vertex indices each; counter-clockwise seen from outside, or clockwise all of them.
     pub triangles: Vec<[u32; 3]>,
     /// Triangles that were dropped because two of their corners have the same position.
     pub degenerate: usize,
@@ -87,11 +88,14 @@ impl TriangleMesh {
         self.triangles.iter().map(|&t| self.cone_volume(t, middle)).sum()
     }
 
-    /// Is every edge used by exactly two triangles, in opposite directions?
+    /// Does the surface have no border: at every edge, do as many triangles run one way as the other?
+    ///
+    /// Parts may touch along edges and at corners, so that an edge may have 4, 6 or more triangles. A surface without
+    /// border has a winding number at every point off it, which is all that clipping asks of a mesh.
     ///
     /// # Errors
-    /// [`Error::Mesh`] with the number of open edges (one triangle), of crowded edges (more than two) and of edges
-    /// whose two triangles are wound inconsistently, and the middle of the first such edge in mm.
+    /// [`Error::Mesh`] with the number of edges that are open (one triangle), that lie between triangles wound in opposite
+    /// senses, or that have more than two triangles and no balance, and the middle of the first such edge in mm.
     pub fn closed(&self) -> Result<()> {
         // One entry for each side of each triangle: the edge, and whether it runs from the lower to the higher index.
         let mut sides: Vec<(u32, u32, bool)> = Vec::with_capacity(3 * self.triangles.len());
@@ -101,70 +105,60 @@ impl TriangleMesh {
             }
         }
         sides.sort_unstable();
-        let (mut open, mut crowded, mut wound) = (0, 0, 0);
+        let (mut open, mut wound, mut unbalanced) = (0, 0, 0);
         let mut first = None;
         for edge in sides.chunk_by(|l, r| (l.0, l.1) == (r.0, r.1)) {
-            match edge {
-                [one, two] if one.2 != two.2 => continue,
-                [_, _] => wound += 1,
-                [_] => open += 1,
-                _ => crowded += 1,
+            if 2 * edge.iter().filter(|side| side.2).count() == edge.len() {
+                continue;
+            }
+            match edge.len() {
+                1 => open += 1,
+                2 => wound += 1,
+                _ => unbalanced += 1,
             }
             first.get_or_insert((edge[0].0, edge[0].1));
         }
         let Some((a, b)) = first else { return Ok(()) };
         let place = (self.vertices[a as usize] + self.vertices[b as usize]) * 0.5;
-        let mut found = Vec::new();
-        for (count, what) in [
-            (open, "open (only one triangle)"),
-            (crowded, "shared by more than two triangles"),
-            (wound, "between triangles that are wound in opposite senses"),
+        let (mut found, mut remedies) = (Vec::new(), Vec::new());
+        for (count, what, remedy) in [
+            (open, "open (only one triangle)", "close the holes and merge vertices that should be one"),
+            (wound, "between triangles that are wound in opposite senses", "make the winding consistent"),
+            (
+                unbalanced,
+                "shared by more than two triangles of which more run one way than the other",
+                "remove what is there twice or ends in a wall",
+            ),
         ] {
             if count > 0 {
                 found.push(format!("{count} {} {what}", if count == 1 { "edge is" } else { "edges are" }));
+                remedies.push(remedy);
             }
         }
         Err(self.wrong(format!(
-            "the surface does not enclose a solid: {}; the first is at ({}, {}, {}) mm; close the holes, merge \
-             vertices and make the winding consistent in a mesh editor",
+            "the surface does not enclose a solid: {}; the first is at ({}, {}, {}) mm; in a mesh editor, {}",
             found.join(", "),
             place.x,
             place.y,
-            place.z
+            place.z,
+            remedies.join(", ")
         )))
     }
 
-    /// The same solid with every outer surface facing outward, as the depth peeling needs it.
+    /// Can the mesh clip: is it [closed](Self::closed), and is there anything in it?
     ///
-    /// Surfaces are the connected components. One that lies in no other is an outer surface: if its volume is
-    /// negative it is turned round, together with everything that lies in it. A surface inside another one keeps its
-    /// orientation relative to it, so cavities stay cavities. A mesh that is already right comes back unchanged.
+    /// The solid is where the winding number is not 0. So a mesh that is inside out is the same solid, a part that is
+    /// inside out in another is a cavity, and parts that touch or overlap are one. Linear in the triangles, but for a sort.
     ///
     /// # Errors
-    /// As [`TriangleMesh::closed`]; [`Error::Mesh`] when the mesh encloses no volume at all.
-    pub fn outward(&self) -> Result<Self> {
+    /// As [`TriangleMesh::closed`]; [`Error::Mesh`] when the winding number is 0 everywhere: a flat or folded sheet, or a
+    /// part and the same part inside out.
+    pub fn check_solid(&self) -> Result<()> {
         self.closed()?;
-        let surfaces = self.surfaces();
-        let mut turned = self.clone();
-        for (index, surface) in surfaces.iter().enumerate() {
-            let outer =
-                !surfaces.iter().enumerate().any(|(o, other)| o != index && self.lies_in(surface, other));
-            if !outer || surface.volume >= 0.0 {
-                continue;
-            }
-            for (o, other) in surfaces.iter().enumerate() {
-                if o == index || self.lies_in(other, surface) {
-                    other.triangles.iter().for_each(|&t| turned.triangles[t as usize].swap(1, 2));
-                }
-            }
+        if self.surfaces().iter().any(|surface| self.encloses(surface)) {
+            return Ok(());
         }
-        let (low, high) = self.bounds();
-        let size = (high - low).as_dvec3();
-        // A flat or folded mesh leaves only rounding behind: far below one part in a million of its box.
-        if turned.signed_volume() <= 1e-9 * size.x.max(size.y).max(size.z).powi(3) {
-            return Err(self.wrong("encloses no volume; a clip mesh must be a solid".into()));
-        }
-        Ok(turned)
+        Err(self.wrong("encloses no volume; a clip mesh must be a solid".into()))
     }
 
     /// Unit sphere: an icosahedron whose triangles are split into four `subdivisions` times (≤ 8), vertices on the
@@ -275,8 +269,8 @@ impl TriangleMesh {
         self.vertices = kept;
     }
 
-    /// Connected components over shared vertices, in order of their first triangle.
-    fn surfaces(&self) -> Vec<Surface> {
+    /// Triangles of the connected components over shared vertices, in order of their first triangle.
+    fn surfaces(&self) -> Vec<Vec<[u32; 3]>> {
         let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
         for &[a, b, c] in &self.triangles {
             let root = find(&mut parent, a);
@@ -286,54 +280,59 @@ impl TriangleMesh {
             }
         }
         let mut slots = HashMap::new();
-        let mut members: Vec<Vec<u32>> = Vec::new();
-        for (index, triangle) in self.triangles.iter().enumerate() {
+        let mut members: Vec<Vec<[u32; 3]>> = Vec::new();
+        for triangle in &self.triangles {
             let slot = *slots.entry(find(&mut parent, triangle[0])).or_insert_with(|| {
                 members.push(Vec::new());
                 members.len() - 1
             });
-            members[slot].push(index as u32);
+            members[slot].push(*triangle);
         }
-        members.into_iter().map(|triangles| self.surface(triangles)).collect()
+        members
     }
 
-    fn surface(&self, triangles: Vec<u32>) -> Surface {
-        let corners = triangles.iter().flat_map(|&t| self.triangles[t as usize]);
-        let (low, high) = bounds_of(corners.map(|v| self.vertices[v as usize]));
+    /// Is the winding number of these triangles, which have no border, anything but 0 somewhere?
+    ///
+    /// ```text
+    /// m_k = ∫ w(x) (d·x)^k dx = Σ_triangles V_t · 6 k! / (k + 3)! · h_k(d·a, d·b, d·c)
+    /// ```
+    ///
+    /// about the middle of their box, V_t the cone over the triangle, h_k the complete homogeneous symmetric polynomial.
+    /// m_0 is the volume. Parts of opposite sense that touch can cancel in it, but not in all moments along a direction
+    /// that is aligned with nothing.
+    fn encloses(&self, triangles: &[[u32; 3]]) -> bool {
+        let corners = triangles.iter().flatten();
+        let (low, high) = bounds_of(corners.map(|&v| self.vertices[v as usize]));
         let middle = (low.as_dvec3() + high.as_dvec3()) * 0.5;
-        let volume = triangles.iter().map(|&t| self.cone_volume(self.triangles[t as usize], middle)).sum();
-        Surface { triangles, low, high, volume }
-    }
-
-    /// Does `inner` lie in the solid that `outer` bounds? By the boxes first, then by the solid angle that `outer`
-    /// covers seen from one vertex of `inner` (Van Oosterom and Strackee 1983): 4π inside, 0 outside.
-    fn lies_in(&self, inner: &Surface, outer: &Surface) -> bool {
-        if !(inner.low.cmpge(outer.low).all() && inner.high.cmple(outer.high).all()) {
-            return false;
+        let radius = (high.as_dvec3() - middle).length();
+        let direction = DVec3::new(0.631_475, 0.553_098, 0.543_412);
+        let mut moments = [0.0; MOMENTS];
+        let mut size = 0.0;
+        for &triangle in triangles {
+            let [a, b, c] = self.corners(triangle).map(|p| (p - middle) / radius);
+            let volume = a.dot(b.cross(c));
+            size += a.length() * b.length() * c.length();
+            let mut h = [0.0; MOMENTS];
+            h[0] = 1.0;
+            for s in [a, b, c].map(|p| p.dot(direction)) {
+                for k in 1..MOMENTS {
+                    h[k] += s * h[k - 1];
+                }
+            }
+            let mut share = 1.0;
+            for k in 0..MOMENTS {
+                moments[k] += volume * share * h[k];
+                share *= (k + 1) as f64 / (k + 4) as f64;
+            }
         }
-        let eye = self.corners(self.triangles[inner.triangles[0] as usize])[0];
-        let angle: f64 = outer
-            .triangles
-            .iter()
-            .map(|&t| {
-                let [a, b, c] = self.corners(self.triangles[t as usize]).map(|p| p - eye);
-                let (la, lb, lc) = (a.length(), b.length(), c.length());
-                let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-                2.0 * a.dot(b.cross(c)).atan2(below)
-            })
-            .sum();
-        angle.abs() > 2.0 * PI
+        // What rounding leaves of so many terms that cancel.
+        let rounding = (triangles.len() + 8) as f64 * f64::EPSILON * size;
+        moments.iter().any(|moment| moment.abs() > rounding)
     }
 }
 
-/// One connected piece of a mesh.
-struct Surface {
-    triangles: Vec<u32>,
-    low: Vec3,
-    high: Vec3,
-    /// mm³, negative when inside out.
-    volume: f64,
-}
+/// Moments of the winding number that are looked at.
+const MOMENTS: usize = 8;
 
 fn bounds_of(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
     points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))

@@ -4,6 +4,7 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod fuzz;
 mod hostile;
 mod house;
 mod mesh;

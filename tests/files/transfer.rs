@@ -189,10 +189,10 @@ fn values_without_opacity_are_found_nearest_first() {
         opacity(&[[1.0, 0.5], [2.0, 0.0], [3.0, 0.0]]).transparent_near(0.0)[0],
         2.0f32.next_down().max(2.0)
     );
-    assert_eq!(opacity(&[[1.0, 0.5]]).transparent_near(0.0), []);
+    assert!(opacity(&[[1.0, 0.5]]).transparent_near(0.0).is_empty());
     // The step belongs to the second point.
     assert_eq!(opacity(&[[1.0, 0.0], [1.0, 0.5]]).transparent_near(7.0), [1.0f32.next_down(); 2]);
-    assert_eq!(opacity(&[[0.0, 0.5], [1.0, 0.0], [1.0, 0.5]]).transparent_near(7.0), []);
+    assert!(opacity(&[[0.0, 0.5], [1.0, 0.0], [1.0, 0.5]]).transparent_near(7.0).is_empty());
 }
 
 #[test]

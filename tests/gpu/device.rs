@@ -2,7 +2,7 @@
 
 use cao_gpu::Error;
 use cao_gpu::{BufferUse, Gpu, OpenOptions, Shader, shader};
-use cao_testing::wgsl::{bind, compile, device_buffer};
+use cao_testing::wgsl::{bind, compile, device_buffer, leak};
 use cao_testing::{close, open, validated};
 use std::process::Command;
 
@@ -95,7 +95,7 @@ fn child_has_no_layer() {
 fn lie(truth: &'static Shader, uses: shader::Use) -> &'static Shader {
     let entry = &truth.entry_points[0];
     let entry = shader::EntryPoint { uses: Box::leak(Box::new([uses])), ..*entry };
-    Box::leak(Box::new(Shader { entry_points: Box::leak(Box::new([entry])), ..*truth }))
+    leak(cao_reflect::Shader { entry_points: Box::leak(Box::new([entry])), ..**truth })
 }
 
 /// The distribution's layer sees this kind of missing barrier, if its synchronization checks are on.
@@ -135,7 +135,7 @@ fn core_validation_catches_a_descriptor_that_reflection_hides() {
          @compute @workgroup_size(1) fn main() { b[0] = 1u; }",
     );
     let binding = shader::Binding { binding: 5, ..truth.bindings[0] };
-    let wrong = Box::leak(Box::new(Shader { bindings: Box::leak(Box::new([binding])), ..*truth }));
+    let wrong = leak(cao_reflect::Shader { bindings: Box::leak(Box::new([binding])), ..**truth });
     // The driver may take it or refuse it; the layer must speak.
     let _ = gpu.compute(wrong, "main");
     assert!(gpu.assert_clean().unwrap_err().to_string().contains("VUID"), "{:?}", gpu.validation_messages());

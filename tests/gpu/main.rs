@@ -5,3 +5,4 @@ mod draw;
 mod hazard;
 mod resources;
 mod shaders;
+mod undefined;

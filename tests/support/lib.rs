@@ -1,8 +1,10 @@
-//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`wgsl`] for tests that
-//! bring kernels of their own.
+//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes ([`meshes`] of several
+//! parts too); [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
 
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
+pub mod fuzz;
+pub mod meshes;
 pub mod wgsl;
 
 use cao::field::Field;

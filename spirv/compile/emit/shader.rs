@@ -7,9 +7,11 @@ use std::fmt::Write;
 /// `SHADER`.
 pub fn shader(out: &mut String, shader: &Shader) -> Written {
     writeln!(out, "    /// Code, entry points and bindings.")?;
-    writeln!(out, "    pub static SHADER: cao_reflect::Shader = {{")?;
+    writeln!(out, "    #[allow(unsafe_code, reason = \"the build keeps the promise of `Shader::new`\")]")?;
+    writeln!(out, "    pub static SHADER: crate::gpu::Shader = {{")?;
     writeln!(out, "        use cao_reflect::*;")?;
-    writeln!(out, "        Shader {{")?;
+    writeln!(out, "        // SAFETY: code and reflection are of one module that naga validated.")?;
+    writeln!(out, "        unsafe {{ crate::gpu::Shader::new(Shader {{")?;
     writeln!(out, "        name: {:?},", shader.name)?;
     writeln!(out, "        spirv: &[")?;
     for words in shader.spirv.chunks(12) {
@@ -24,7 +26,7 @@ pub fn shader(out: &mut String, shader: &Shader) -> Written {
     shader.bindings.iter().try_for_each(|b| binding(out, b))?;
     writeln!(out, "        ],")?;
     writeln!(out, "        push_bytes: {},", shader.push_bytes)?;
-    writeln!(out, "        }}\n    }};")
+    writeln!(out, "        }}) }}\n    }};")
 }
 
 fn entry_point(out: &mut String, entry: &EntryPoint) -> Written {
@@ -49,7 +51,7 @@ fn binding(out: &mut String, b: &Binding) -> Written {
     });
     writeln!(
         out,
-        "            Binding {{ name: {:?}, group: {}, binding: {}, kind: BindingKind::{:?}, image: {image}, reads: {}, writes: {} }},",
-        b.name, b.group, b.binding, b.kind, b.reads, b.writes
+        "            Binding {{ name: {:?}, group: {}, binding: {}, kind: BindingKind::{:?}, min_bytes: {}, image: {image}, reads: {}, writes: {} }},",
+        b.name, b.group, b.binding, b.kind, b.min_bytes, b.reads, b.writes
     )
 }

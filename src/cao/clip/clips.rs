@@ -133,10 +133,10 @@ impl ClipSet {
             peeled.push(match found {
                 Some(index) => self.peeled.swap_remove(index),
                 None => {
-                    // Front and back layers have their meaning only where faces look outward.
-                    let solid = mesh.outward()?;
-                    let camera = ClipCamera::around(&solid, scale, margin, settings.resolution);
-                    let layers = peel.run(gpu, &solid, scale, camera, settings.pairs)?;
+                    // Layer pairs have their meaning only where there is an inside.
+                    mesh.check_solid()?;
+                    let camera = ClipCamera::around(mesh, scale, margin, settings.resolution);
+                    let layers = peel.run(gpu, mesh, scale, camera, settings.pairs)?;
                     timings.push(stages::PEEL, layers.milliseconds);
                     Peeled { mesh: mesh.clone(), scale, margin, settings, layers }
                 }

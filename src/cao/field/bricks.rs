@@ -54,7 +54,12 @@ impl BrickList {
         let [groups_x, groups_y, groups_z] = row_of_groups(count);
         let head = Head { groups_x, groups_y, groups_z, count };
         let content = [bytemuck::bytes_of(&head), bytemuck::cast_slice(bricks)].concat();
-        Ok(Self { buffer: device_buffer(gpu, "brick list", &content)? })
+        let buffer = device_buffer(gpu, "brick list", &content)?;
+        // What is copied could be any number of groups; what is updated is looked at.
+        let mut rec = gpu.recorder("brick list")?;
+        rec.update(&buffer, 0, bytemuck::bytes_of(&[groups_x, groups_y, groups_z]))?;
+        rec.submit_and_wait()?;
+        Ok(Self { buffer })
     }
 
     /// As a part of an update works on it.

@@ -1,13 +1,14 @@
 //! Depth layers of a clip mesh (CAO §3.4 step 2; any number of layer pairs, the paper's future work).
 //!
 //! The ray through each pixel's centre, along +z of the clip camera, meets the mesh in front faces (normal against
-//! the ray) and back faces. Sorted by depth, the k-th front and the k-th back are pair k. For a closed mesh that is
-//! oriented outward, the union of all pairs is where the winding number is positive.
+//! the ray) and back faces. Sorted by depth, a front adds 1 to the winding number and a back takes 1 away; the k-th pair
+//! is the k-th stretch in which the number is not 0. Gaps and stretches no longer than [`ONE_DEPTH`] are none.
 //!
 //! Vertices are snapped to 2⁻¹⁶ pixel, then coverage is exact in integers, ties by the top-left rule: a closed mesh
 //! has as many front as back faces at every pixel, whatever its triangles look like.
 
 use crate::clip::clips::{MeshLayers, NO_BACK, NO_FRONT};
+use cao_kernels::shared::layers::ONE_DEPTH;
 use cao_model::clip::ClipCamera;
 use cao_model::mesh::TriangleMesh;
 use glam::{DVec3, Vec3};
@@ -17,7 +18,7 @@ use glam::{DVec3, Vec3};
 pub struct Report {
     /// Pixels with more front than back faces or the reverse: the mesh has a hole there.
     pub open_pixels: usize,
-    /// Pixels with more faces than layers were asked for: the cut is wrong there.
+    /// Pixels with more pairs than were asked for: the cut is wrong there.
     pub unresolved_pixels: usize,
     /// The first such pixel (x, y) in row order.
     pub first: Option<[u32; 2]>,
@@ -26,8 +27,7 @@ pub struct Report {
 /// Peels `layers` pairs from `mesh` scaled by `scale` (each > 0), as `camera` sees it.
 pub fn peel(mesh: &TriangleMesh, scale: Vec3, camera: &ClipCamera, layers: usize) -> (MeshLayers, Report) {
     let side = camera.resolution as usize;
-    let mut fronts: Vec<Vec<f64>> = vec![Vec::new(); side * side];
-    let mut backs = fronts.clone();
+    let mut faces: Vec<Vec<(f64, i32)>> = vec![Vec::new(); side * side];
     let place = |index: u32| {
         let offset = (mesh.vertices[index as usize] * scale).as_dvec3() - camera.corner.as_dvec3();
         let (pixel, depth) = (f64::from(camera.pixel_mm), f64::from(camera.depth_mm));
@@ -37,34 +37,53 @@ pub fn peel(mesh: &TriangleMesh, scale: Vec3, camera: &ClipCamera, layers: usize
         let corners = triangle.map(place);
         let area = corners[0].side(&corners[1], [corners[2].x, corners[2].y]);
         // The normal's z has the sign of the area in the xy plane. Edge-on triangles cover no pixel's centre.
-        let (corners, list) = match area {
+        let (corners, step) = match area {
             0 => continue,
-            1.. => (corners, &mut backs),
-            _ => ([corners[0], corners[2], corners[1]], &mut fronts),
+            1.. => (corners, -1),
+            _ => ([corners[0], corners[2], corners[1]], 1),
         };
-        cover(&corners, area.unsigned_abs() as f64, side, |pixel, depth| list[pixel].push(depth));
+        cover(&corners, area.unsigned_abs() as f64, side, |pixel, depth| faces[pixel].push((depth, step)));
     }
     let mut report = Report::default();
-    for (pixel, (front, back)) in fronts.iter_mut().zip(&mut backs).enumerate() {
-        front.sort_unstable_by(f64::total_cmp);
-        back.sort_unstable_by(f64::total_cmp);
-        let open = front.len() != back.len();
-        let unresolved = front.len().max(back.len()) > layers;
+    let mut pairs = Vec::new();
+    for (pixel, faces) in faces.iter_mut().enumerate() {
+        faces.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let open = faces.iter().map(|face| face.1).sum::<i32>() != 0;
+        pairs.push(stretches(faces));
+        let unresolved = pairs[pixel].len() > layers;
         report.open_pixels += usize::from(open);
         report.unresolved_pixels += usize::from(unresolved);
         if open || unresolved {
             report.first.get_or_insert([(pixel % side) as u32, (pixel / side) as u32]);
         }
     }
-    let layer = |faces: &[Vec<f64>], k: usize, none: f32| -> Vec<f32> {
-        faces.iter().map(|depths| depths.get(k).map_or(none, |&depth| depth as f32)).collect()
+    let layer = |k: usize, end: usize, none: f32| -> Vec<f32> {
+        pairs.iter().map(|pairs| pairs.get(k).map_or(none, |pair| pair[end] as f32)).collect()
     };
     let pairs = MeshLayers {
         camera: *camera,
-        front: (0..layers).map(|k| layer(&fronts, k, NO_FRONT)).collect(),
-        back: (0..layers).map(|k| layer(&backs, k, NO_BACK)).collect(),
+        front: (0..layers).map(|k| layer(k, 0, NO_FRONT)).collect(),
+        back: (0..layers).map(|k| layer(k, 1, NO_BACK)).collect(),
     };
     (pairs, report)
+}
+
+/// Where along a pixel's ray the winding number is not 0, from its faces in the order of depth.
+fn stretches(faces: &[(f64, i32)]) -> Vec<[f64; 2]> {
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    let mut winding = 0;
+    for (face, next) in faces.iter().zip(faces.iter().skip(1)) {
+        winding += face.1;
+        if winding == 0 {
+            continue;
+        }
+        match found.last_mut() {
+            Some(last) if face.0 - last[1] <= f64::from(ONE_DEPTH) => last[1] = next.0,
+            _ => found.push([face.0, next.0]),
+        }
+    }
+    found.retain(|pair| pair[1] - pair[0] > f64::from(ONE_DEPTH));
+    found
 }
 
 /// A projected vertex: x and y in 2⁻¹⁶ pixel, depth 0 … 1.
@@ -240,7 +259,7 @@ pub(crate) mod tests {
 
     /// A shell inside a shell: turned inward it makes a cavity, turned outward it changes nothing.
     #[test]
-    fn nested_shells_are_where_the_winding_number_is_positive() {
+    fn nested_shells_are_where_the_winding_number_is_not_0() {
         let ball = TriangleMesh::sphere(3);
         for cavity in [true, false] {
             let mesh = join(&[(&ball, Vec3::ZERO, 1.0, false), (&ball, Vec3::ZERO, 0.5, cavity)]);

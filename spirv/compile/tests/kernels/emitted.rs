@@ -3,9 +3,11 @@ pub mod awkward {
     pub use super::shared::outer::*;
     pub use super::shared::parts::*;
     /// Code, entry points and bindings.
-    pub static SHADER: cao_reflect::Shader = {
+    #[allow(unsafe_code, reason = "the build keeps the promise of `Shader::new`")]
+    pub static SHADER: crate::gpu::Shader = {
         use cao_reflect::*;
-        Shader {
+        // SAFETY: code and reflection are of one module that naga validated.
+        unsafe { crate::gpu::Shader::new(Shader {
         name: "awkward",
         spirv: &[
         ],
@@ -28,15 +30,15 @@ pub mod awkward {
             ] },
         ],
         bindings: &[
-            Binding { name: "awkward", group: 0, binding: 0, kind: BindingKind::Uniform, image: None, reads: true, writes: false },
-            Binding { name: "counted", group: 0, binding: 1, kind: BindingKind::Storage, image: None, reads: true, writes: true },
-            Binding { name: "outer", group: 0, binding: 2, kind: BindingKind::Storage, image: None, reads: true, writes: false },
-            Binding { name: "volume", group: 0, binding: 3, kind: BindingKind::Sampled, image: Some(ImageBinding { view: ViewDim::D3, texel: Texel::Float, format: None }), reads: true, writes: false },
-            Binding { name: "linear", group: 0, binding: 4, kind: BindingKind::Sampler, image: None, reads: true, writes: false },
-            Binding { name: "words", group: 0, binding: 5, kind: BindingKind::Storage, image: None, reads: false, writes: true },
+            Binding { name: "awkward", group: 0, binding: 0, kind: BindingKind::Uniform, min_bytes: 1184, image: None, reads: true, writes: false },
+            Binding { name: "counted", group: 0, binding: 1, kind: BindingKind::Storage, min_bytes: 48, image: None, reads: true, writes: true },
+            Binding { name: "outer", group: 0, binding: 2, kind: BindingKind::Storage, min_bytes: 64, image: None, reads: true, writes: false },
+            Binding { name: "volume", group: 0, binding: 3, kind: BindingKind::Sampled, min_bytes: 0, image: Some(ImageBinding { view: ViewDim::D3, texel: Texel::Float, format: None }), reads: true, writes: false },
+            Binding { name: "linear", group: 0, binding: 4, kind: BindingKind::Sampler, min_bytes: 0, image: None, reads: true, writes: false },
+            Binding { name: "words", group: 0, binding: 5, kind: BindingKind::Storage, min_bytes: 4, image: None, reads: false, writes: true },
         ],
         push_bytes: 0,
-        }
+        }) }
     };
     /// `const STEP = 8`
     pub const STEP: i32 = 8;
@@ -203,9 +205,11 @@ pub mod awkward {
 pub mod picture {
     pub use super::shared::parts::*;
     /// Code, entry points and bindings.
-    pub static SHADER: cao_reflect::Shader = {
+    #[allow(unsafe_code, reason = "the build keeps the promise of `Shader::new`")]
+    pub static SHADER: crate::gpu::Shader = {
         use cao_reflect::*;
-        Shader {
+        // SAFETY: code and reflection are of one module that naga validated.
+        unsafe { crate::gpu::Shader::new(Shader {
         name: "picture",
         spirv: &[
         ],
@@ -218,11 +222,11 @@ pub mod picture {
             ] },
         ],
         bindings: &[
-            Binding { name: "corners", group: 0, binding: 0, kind: BindingKind::Storage, image: None, reads: true, writes: false },
-            Binding { name: "before", group: 0, binding: 1, kind: BindingKind::Sampled, image: Some(ImageBinding { view: ViewDim::D2, texel: Texel::Float, format: None }), reads: true, writes: false },
+            Binding { name: "corners", group: 0, binding: 0, kind: BindingKind::Storage, min_bytes: 32, image: None, reads: true, writes: false },
+            Binding { name: "before", group: 0, binding: 1, kind: BindingKind::Sampled, min_bytes: 0, image: Some(ImageBinding { view: ViewDim::D2, texel: Texel::Float, format: None }), reads: true, writes: false },
         ],
         push_bytes: 16,
-        }
+        }) }
     };
     /// `struct Look`
     #[repr(C)]
