@@ -1,4 +1,5 @@
-// Which bricks an edit concerns: those with voxels that need a value and within reach of a changed brick (method.md section 5).
+// Which bricks an edit concerns: those within reach of a changed brick that need values, or have some that nothing needs any more
+// (method.md section 5).
 //
 // `spread` is one pass of a separable Euclidean distance transform over bricks, along one axis; the distance between two
 // bricks is that of their nearest voxels. After three passes `choose` decides, and lists the bricks to compute.
@@ -69,8 +70,12 @@ fn choose(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
             needed |= contact.bits[brick_index(vec3<u32>(place), params.bricks)] >> u32(26 - n) & 1u;
         }
     }
-    let chosen = needed == 1u && before.squared[index] <= params.reach * params.reach;
-    todo.brick[index] = select(0u, TODO, chosen);
+    let valued = (todo.brick[index] & VALUED) != 0u;
+    let near = before.squared[index] <= params.reach * params.reach;
+    // Where nothing needs its values any more they go back to 1.
+    let chosen = near && (needed == 1u || valued);
+    let kept = select(valued, needed == 1u, near);
+    todo.brick[index] = select(0u, TODO, chosen) | select(0u, VALUED, kept);
     if chosen {
         let slot = atomicAdd(&growing.count, 1u);
         growing.items[slot] = index;
