@@ -29,6 +29,9 @@ use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
 use cao_model::volume::Volume;
 
+#[cfg(test)]
+mod failures;
+
 /// Format of the colour images that [`Renderer::draw`] makes.
 pub const COLOUR: Format = Format::Rgba32Float;
 
@@ -105,7 +108,7 @@ impl Renderer {
             Err(error) => {
                 // Maps of one radius under rays of another would leave voxels stale.
                 self.subject.setup = before;
-                self.prepare_clips()?;
+                self.restore_clips()?;
                 return Err(error);
             }
         }
@@ -129,9 +132,10 @@ impl Renderer {
     /// # Errors
     /// [`cao_model::Error::Config`] if the box is not inside the volume or the values are of another type.
     pub fn set_values(&mut self, first: [u32; 3], values: &Volume) -> Result<()> {
-        self.subject.field.overwrite(&self.subject.gpu, first, values)?;
-        self.changed.opacities = true;
-        Ok(())
+        let written = self.subject.field.overwrite(&self.subject.gpu, first, values);
+        // Values that are refused change nothing; where the device fails some may be there.
+        self.changed.opacities |= !matches!(written, Err(Error::Model(_)));
+        written
     }
 
     /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or has a new scale; moving
@@ -140,10 +144,18 @@ impl Renderer {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
         if let Err(error) = self.prepare_clips() {
             self.subject.clips = before;
-            self.prepare_clips()?;
+            self.restore_clips()?;
             return Err(error);
         }
         self.changed.clips = true;
+        Ok(())
+    }
+
+    /// Maps of clip meshes again, after others failed. Where these fail too, nothing counts as done.
+    fn restore_clips(&mut self) -> Result<()> {
+        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
+        self.prepare_clips()?;
+        self.changed = changed;
         Ok(())
     }
 
@@ -153,16 +165,24 @@ impl Renderer {
         Ok(())
     }
 
-    /// What there is to do, in order.
-    fn parts(&self) -> Vec<Part<'_>> {
-        if self.changed == Changed::NOTHING {
+    /// What changed. From here on nothing counts as done until all of it is: an error or a panic on the way leaves everything to do.
+    fn begin(&mut self) -> Changed {
+        match self.changed {
+            Changed::NOTHING => Changed::NOTHING,
+            _ => std::mem::replace(&mut self.changed, Changed::ALL),
+        }
+    }
+
+    /// What there is to do after these changes, in order.
+    fn parts(&self, changed: Changed) -> Vec<Part<'_>> {
+        if changed == Changed::NOTHING {
             return Vec::new();
         }
         let mut parts = Vec::new();
-        if self.changed.opacities {
+        if changed.opacities {
             parts.push(self.subject.occupancy());
         }
-        parts.extend(self.ambient.update(&self.subject, self.changed));
+        parts.extend(self.ambient.update(&self.subject, changed));
         parts.push(self.distances());
         parts
     }
@@ -182,7 +202,8 @@ impl Renderer {
     /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
     /// nothing counts as done, and what was recorded should not be submitted.
     pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
-        let parts = self.parts();
+        let changed = self.begin();
+        let parts = self.parts(changed);
         if !parts.is_empty() {
             drive::record(rec, &parts)?;
         }
@@ -194,11 +215,16 @@ impl Renderer {
     }
 
     /// The same on the device's own queue, in parts, telling `progress` the share done. Waits for the end; returns the time of each
-    /// stage, clip meshes prepared since the last update included.
+    /// stage, clip meshes prepared since the last update included. After an error, or a panic of `progress`, nothing counts as done, and
+    /// the next update computes everything.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
+        let changed = self.begin();
+        if !self.subject.clips_are_prepared() {
+            self.prepare_clips()?;
+        }
         let mut timings = std::mem::take(&mut self.prepared);
         let mut pace = std::mem::take(&mut self.pace);
-        let ran = drive::run(&self.subject.gpu, &self.parts(), &mut pace, progress);
+        let ran = drive::run(&self.subject.gpu, &self.parts(changed), &mut pace, progress);
         self.pace = pace;
         timings.extend(ran?);
         self.changed = Changed::NOTHING;
@@ -311,11 +337,10 @@ impl Renderer {
     /// Brings V_o alone up to date; V_AO goes out of date, so that the next update computes everything. Uses the device's queue and waits
     /// for it.
     pub(crate) fn update_opacity(&mut self) -> Result<()> {
-        let mut parts = self.parts();
+        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
+        let mut parts = self.parts(changed);
         parts.retain(|part| matches!(part.stage().phase, Phase::Opacity | Phase::Clip));
         drive::run(&self.subject.gpu, &parts, &mut Pace::default(), &mut |_| ())?;
-        drop(parts);
-        self.changed = Changed::ALL;
         Ok(())
     }
 

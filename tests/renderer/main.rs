@@ -1,4 +1,4 @@
-//! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, leaks, budgets.
+//! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, failures, leaks, budgets.
 
 mod adopt;
 mod consistency;
@@ -6,6 +6,7 @@ mod contextual;
 mod edits;
 mod embed;
 mod exactness;
+mod failures;
 mod frames;
 mod host;
 mod leaks;

@@ -189,6 +189,11 @@ impl ClipSet {
         Ok(timings)
     }
 
+    /// Whether the maps of all meshes among these clips are there.
+    pub(crate) fn fits(&self, clips: &[Clip]) -> bool {
+        self.meshes.len() == clips.iter().filter(|clip| matches!(clip.shape, Shape::Mesh(_))).count()
+    }
+
     /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
     pub fn record(&self, rec: &mut Recorder, clips: &[Clip], half_mm: f32) -> Result<()> {
         check(clips)?;
@@ -211,7 +216,7 @@ impl ClipSet {
                 Shape::Torus => kinds::TORUS,
                 Shape::Mesh(mesh) => {
                     let map = meshes.next().ok_or_else(|| {
-                        Error::refused(&format!("clip {}", mesh.name), "its depth layers were not prepared")
+                        Error::refused(&format!("clip {}", mesh.name), "its depth layers could not be made; call set_clips again")
                     })?;
                     slot.corner = map.camera.corner.extend(1.0 / map.camera.pixel_mm).to_array();
                     slot.pairs = map.pairs;
