@@ -10,6 +10,7 @@ mod failures;
 mod frames;
 mod host;
 mod leaks;
+mod lengths;
 mod methods;
 mod planner;
 mod real_data;
