@@ -51,12 +51,13 @@ fn in_dilation(c: u32, rigid: vec3<f32>) -> bool {
     let resolution = clips.clip[c].dilation_resolution;
     let map = map_of(c, rigid);
     let cells = clips.clip[c].cells;
-    let cell = vec2<i32>(floor((rigid.xy - cells.xy) * cells.z));
-    if any(cell < vec2(0)) || any(cell >= vec2(i32(resolution))) {
+    let place = (rigid.xy - cells.xy) * cells.z;
+    if !(all(place >= vec2(0.0)) && all(place < vec2(f32(resolution)))) {
         return keep;
     }
+    let cell = vec2<u32>(place);
     let size = resolution * resolution;
-    var at = clips.clip[c].dilation_at + u32(cell.y) * resolution + u32(cell.x);
+    var at = clips.clip[c].dilation_at + cell.y * resolution + cell.x;
     for (var pair = 0u; pair < clips.clip[c].pairs; pair++) {
         if dilation.depth[at] < map.z && map.z < dilation.depth[at + size] {
             return !keep;

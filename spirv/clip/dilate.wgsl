@@ -16,8 +16,7 @@ struct DilateParams {
     cell_mm: f32,
     depth_mm: f32,
     flags: u32,
-    // the maps' corner and cell edge in pixels of the layers
-    first: vec2<f32>,
+    // a cell's edge in pixels of the layers; both maps have the same middle
     per_cell: f32,
 }
 
@@ -37,6 +36,11 @@ var<immediate> params: DilateParams;
 @group(0) @binding(1) var<storage, read_write> blocks: Blocks;
 @group(0) @binding(2) var<storage, read_write> dilation: Dilation;
 
+// The pixel at a place of the layers; -1 or `resolution` beyond them, where a whole number may not hold it.
+fn pixel_of(place: vec2<f32>) -> vec2<i32> {
+    return vec2<i32>(clamp(floor(place), vec2(-1.0), vec2(f32(params.resolution))));
+}
+
 // Hull of the intervals in the pixels under a cell (kept shapes: what all of them share, and nothing where the cell reaches
 // beyond the layers). z is the layer pair.
 @compute @workgroup_size(8, 8, 1)
@@ -46,12 +50,12 @@ fn reduce(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let keep = (params.flags & KEEP) != 0u;
     let size = params.resolution * params.resolution;
-    // A thousandth of a pixel is more than rounding moves the cell's edges.
-    let corner = params.first + vec2<f32>(id.xy) * params.per_cell;
+    // From the middle, where the layers are: there a thousandth of a pixel is more than rounding moves the cell's edges.
+    let corner = 0.5 * f32(params.resolution) + (vec2<f32>(id.xy) - 0.5 * f32(params.cells)) * params.per_cell;
     let literal = (params.flags & LITERAL) != 0u;
     let last = i32(params.resolution) - 1;
-    let low = select(vec2<i32>(floor(corner - 1e-3)), vec2<i32>(id.xy), literal);
-    let high = select(vec2<i32>(floor(corner + params.per_cell + 1e-3)), vec2<i32>(id.xy), literal);
+    let low = select(pixel_of(corner - 1e-3), vec2<i32>(id.xy), literal);
+    let high = select(pixel_of(corner + params.per_cell + 1e-3), vec2<i32>(id.xy), literal);
     let beyond = any(low < vec2(0)) || any(high > vec2(last));
     var front = select(1.0, 0.0, keep && !beyond);
     var back = select(0.0, 1.0, keep && !beyond);
@@ -91,8 +95,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     var nearest = vec2(0);
     var farthest = vec2(i32(params.cells) - 1);
     if !keep && !literal {
-        nearest = max(nearest, vec2<i32>(floor(-params.first / params.per_cell)));
-        farthest = min(farthest, vec2<i32>(floor((f32(params.resolution) - params.first) / params.per_cell)));
+        let middle = 0.5 * f32(params.cells);
+        let half_edge = 0.5 * f32(params.resolution) / params.per_cell;
+        nearest = max(nearest, vec2(i32(floor(middle - half_edge))));
+        farthest = min(farthest, vec2(i32(floor(middle + half_edge))));
     }
     // A kept shape ends at the map's edge at the latest: everything beyond is outside it.
     var front = select(NO_FRONT, 0.0, keep);

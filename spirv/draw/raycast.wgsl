@@ -44,8 +44,8 @@ const TILE = 8u;
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
 const LEAP_MARGIN = 0.1;
 
-// Below this gradient of opacity per mm there is no surface.
-const FLAT_PER_MM = 1e-4;
+// Below this gradient of opacity per smallest spacing there is no surface.
+const FLAT = 1e-4;
 
 // Halvings of a step at a cut: to 1/16 of it.
 const CUT_HALVINGS = 4u;
@@ -91,13 +91,14 @@ fn opacity_at(position: vec3<f32>) -> f32 {
 // Lambert's term of a surface seen from either side, from the gradient of the clipped opacity, so that cut faces are shaded
 // as surfaces. Where there is no gradient there is no surface, and the term is 1.
 fn surface_light(position: vec3<f32>) -> f32 {
+    let voxel = frame.spacing.xyz / min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
     let gradient = vec3(
         opacity_at(position + vec3(1.0, 0.0, 0.0)) - opacity_at(position - vec3(1.0, 0.0, 0.0)),
         opacity_at(position + vec3(0.0, 1.0, 0.0)) - opacity_at(position - vec3(0.0, 1.0, 0.0)),
         opacity_at(position + vec3(0.0, 0.0, 1.0)) - opacity_at(position - vec3(0.0, 0.0, 1.0)),
-    ) / (2.0 * frame.spacing.xyz);
+    ) / (2.0 * voxel);
     let steepness = length(gradient);
-    if steepness < FLAT_PER_MM {
+    if steepness < FLAT {
         return 1.0;
     }
     return abs(dot(gradient, frame.light.xyz)) / steepness;

@@ -1,4 +1,5 @@
-// Which bricks an edit concerns: those with voxels that need a value and within reach of a changed brick (method.md section 5).
+// Which bricks an edit concerns: those within reach of a changed brick that need values, or have some that nothing needs any more
+// (method.md section 5).
 //
 // `spread` is one pass of a separable Euclidean distance transform over bricks, along one axis; the distance between two
 // bricks is that of their nearest voxels. After three passes `choose` decides, and lists the bricks to compute.
@@ -53,8 +54,8 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     after.squared[index] = least;
 }
 
-// Whether a brick is to be computed.
-fn chosen(index: u32) -> bool {
+// Whether a sample with opacity interpolates a value of a brick.
+fn needed(index: u32) -> bool {
     let own = brick_at(index, params.bricks);
     var needed = params.unneeded;
     // The brick's own opacity, or a neighbour's that touches it.
@@ -64,7 +65,7 @@ fn chosen(index: u32) -> bool {
             needed |= contact.bits[brick_index(vec3<u32>(place), params.bricks)] >> u32(26 - n) & 1u;
         }
     }
-    return needed == 1u && before.squared[index] <= params.reach * params.reach;
+    return needed == 1u;
 }
 
 // One invocation a brick.
@@ -75,10 +76,15 @@ fn choose(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let index = item_of(id, groups);
-    let exists = index < brick_count(params.bricks);
-    let wanted = exists && chosen(index);
-    if exists {
-        todo.brick[index] = select(0u, TODO, wanted);
+    var chosen = false;
+    if index < brick_count(params.bricks) {
+        let needs = needed(index);
+        let valued = (todo.brick[index] & VALUED) != 0u;
+        let near = before.squared[index] <= params.reach * params.reach;
+        // Where nothing needs its values any more they go back to 1.
+        chosen = near && (needs || valued);
+        let kept = select(valued, needs, near);
+        todo.brick[index] = select(0u, TODO, chosen) | select(0u, VALUED, kept);
     }
-    put_in(index, wanted, lane);
+    put_in(index, chosen, lane);
 }

@@ -111,7 +111,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         if surface.w == 0.0 || surface.z < sample.z + params.bias {
             continue;
         }
-        let range = min(params.radius / max(abs(here.z - surface.z), 1e-6), 1.0);
+        let range = params.radius / max(abs(here.z - surface.z), params.radius);
         hidden += range * range * (3.0 - 2.0 * range);
     }
     occlusion.factor[index] = 1.0 - hidden / f32(max(params.samples, 1u));

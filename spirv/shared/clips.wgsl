@@ -91,12 +91,13 @@ fn map_of(c: u32, rigid: vec3<f32>) -> vec3<f32> {
 fn inside_layers(c: u32, rigid: vec3<f32>) -> bool {
     let resolution = clips.clip[c].resolution;
     let map = map_of(c, rigid);
-    let pixel = vec2<i32>(floor(map.xy));
-    if any(pixel < vec2(0)) || any(pixel >= vec2(i32(resolution))) {
+    // Before it becomes a whole number, which may not hold what is far outside.
+    if !(all(map.xy >= vec2(0.0)) && all(map.xy < vec2(f32(resolution)))) {
         return false;
     }
+    let pixel = vec2<u32>(map.xy);
     let size = resolution * resolution;
-    var at = clips.clip[c].layers_at + u32(pixel.y) * resolution + u32(pixel.x);
+    var at = clips.clip[c].layers_at + pixel.y * resolution + pixel.x;
     for (var pair = 0u; pair < clips.clip[c].pairs; pair++) {
         if layers.depth[at] < map.z && map.z < layers.depth[at + size] {
             return true;

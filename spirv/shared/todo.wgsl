@@ -4,3 +4,5 @@
 
 // Its values are to be computed.
 const TODO = 1u;
+// It has values; the voxels of a brick that has none hold 1.
+const VALUED = 2u;

@@ -13,7 +13,7 @@ struct Contact {
     bits: array<u32>,
 }
 
-// What is to be done in it: TODO or nothing.
+// What is to be done in it, and whether it has values: bits of todo.wgsl.
 struct Todo {
     brick: array<u32>,
 }

@@ -12,7 +12,7 @@ use crate::draw::brick_distance::BrickDistance;
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
 use crate::draw::present::Present;
-use crate::draw::raycast::{Bindings, Raycast};
+use crate::draw::raycast::Raycast;
 use crate::drive::{self, Pace, Part};
 use crate::field::Field;
 use crate::field::volume_image;
@@ -21,27 +21,19 @@ use crate::method;
 use crate::stages;
 use crate::subject::Subject;
 use crate::{Error, Result};
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Phase, Recorder, Timings};
+use cao_gpu::{Access, Buffer, Format, Gpu, Image, Phase, Recorder, Timings};
 use cao_model::clip::Clip;
-use cao_model::look::Look;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
-use cao_model::view::View;
 use cao_model::volume::Volume;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
+
+mod drawing;
+#[cfg(test)]
+mod failures;
 
 pub use crate::draw::picture::COLOUR;
-
-/// The images of all views, left and right first, read back from the device.
-#[derive(Clone, Debug)]
-pub struct StereoImage<const VIEWS: usize = 2> {
-    /// Width and height of one view in pixels.
-    pub size: [u32; 2],
-    /// Of each view: premultiplied linear RGBA, rows from the top.
-    pub colour: [Vec<[f32; 4]>; VIEWS],
-    /// Of each view: Vulkan depth, 1 where nothing is drawn.
-    pub depth: [Vec<f32>; VIEWS],
-}
+pub use drawing::StereoImage;
 
 /// Renders one volume.
 pub struct Renderer {
@@ -110,7 +102,7 @@ impl Renderer {
             Err(error) => {
                 // Maps of one radius under rays of another would leave voxels stale.
                 self.subject.setup = before;
-                self.prepare_clips()?;
+                self.restore_clips()?;
                 return Err(error);
             }
         }
@@ -134,9 +126,10 @@ impl Renderer {
     /// # Errors
     /// [`cao_model::Error::Config`] if the box is not inside the volume or the values are of another type.
     pub fn set_values(&mut self, first: [u32; 3], values: &Volume) -> Result<()> {
-        self.subject.field.overwrite(&self.subject.gpu, first, values)?;
-        self.changed.opacities = true;
-        Ok(())
+        let written = self.subject.field.overwrite(&self.subject.gpu, first, values);
+        // Values that are refused change nothing; where the device fails some may be there.
+        self.changed.opacities |= !matches!(written, Err(Error::Model(_)));
+        written
     }
 
     /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or has a new scale; moving
@@ -145,10 +138,18 @@ impl Renderer {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
         if let Err(error) = self.prepare_clips() {
             self.subject.clips = before;
-            self.prepare_clips()?;
+            self.restore_clips()?;
             return Err(error);
         }
         self.changed.clips = true;
+        Ok(())
+    }
+
+    /// Maps of clip meshes again, after others failed. Where these fail too, nothing counts as done.
+    fn restore_clips(&mut self) -> Result<()> {
+        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
+        self.prepare_clips()?;
+        self.changed = changed;
         Ok(())
     }
 
@@ -158,16 +159,24 @@ impl Renderer {
         Ok(())
     }
 
-    /// What there is to do, in order.
-    fn parts(&self) -> Vec<Part<'_>> {
-        if self.changed == Changed::NOTHING {
+    /// What changed. From here on nothing counts as done until all of it is: an error or a panic on the way leaves everything to do.
+    fn begin(&mut self) -> Changed {
+        match self.changed {
+            Changed::NOTHING => Changed::NOTHING,
+            _ => std::mem::replace(&mut self.changed, Changed::ALL),
+        }
+    }
+
+    /// What there is to do after these changes, in order.
+    fn parts(&self, changed: Changed) -> Vec<Part<'_>> {
+        if changed == Changed::NOTHING {
             return Vec::new();
         }
         let mut parts = Vec::new();
-        if self.changed.opacities {
+        if changed.opacities {
             parts.push(self.subject.occupancy());
         }
-        parts.extend(self.ambient.update(&self.subject, self.changed));
+        parts.extend(self.ambient.update(&self.subject, changed));
         parts.push(self.distances());
         parts
     }
@@ -187,7 +196,8 @@ impl Renderer {
     /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
     /// nothing counts as done, and what was recorded should not be submitted.
     pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
-        let parts = self.parts();
+        let changed = self.begin();
+        let parts = self.parts(changed);
         if !parts.is_empty() {
             drive::record(rec, &parts)?;
         }
@@ -199,11 +209,16 @@ impl Renderer {
     }
 
     /// The same on the device's own queue, in parts, telling `progress` the share done. Waits for the end; returns the time of each
-    /// stage, clip meshes prepared since the last update included.
+    /// stage, clip meshes prepared since the last update included. After an error, or a panic of `progress`, nothing counts as done, and
+    /// the next update computes everything.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
+        let changed = self.begin();
+        if !self.subject.clips_are_prepared() {
+            self.prepare_clips()?;
+        }
         let mut timings = std::mem::take(&mut self.prepared);
         let mut pace = std::mem::take(&mut self.pace);
-        let ran = drive::run(&self.subject.gpu, &self.parts(), &mut pace, progress);
+        let ran = drive::run(&self.subject.gpu, &self.parts(changed), &mut pace, progress);
         self.pace = pace;
         timings.extend(ran?);
         self.changed = Changed::NOTHING;
@@ -224,125 +239,13 @@ impl Renderer {
         }
     }
 
-    /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
-    /// can read it afterwards. Refuses while the ambient volume is out of date.
-    pub fn record_picture(
-        &self,
-        rec: &mut Recorder,
-        views: &[View],
-        look: &Look,
-        picture: &Picture,
-    ) -> Result<()> {
-        self.current()?;
-        if picture.views() != views.len() {
-            let problem = format!("has room for {} views, given are {}", picture.views(), views.len());
-            return Err(Error::refused("picture", problem));
-        }
-        let (subject, fields) = (&self.subject, self.ambient.fields());
-        self.frame.record(rec, &subject.field, views, look, subject.reference_mm())?;
-        rec.barrier(
-            &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead, Access::StorageWrite],
-            &[Access::StorageWrite],
-        );
-        rec.discard(&picture.colour);
-        rec.discard(&picture.depth);
-        rec.barrier(&[], &[Access::StorageWrite]);
-        rec.stage(stages::RAYCAST)?;
-        let bindings = Bindings {
-            field: &subject.field,
-            transfer: &subject.transfer_buffer,
-            opacity: fields.opacity,
-            ambient: fields.ambient,
-            distances: &self.distances,
-            clips: &subject.clip_set,
-            frame: &self.frame,
-        };
-        self.raycast.record(rec, bindings, picture)?;
-        rec.end_stage()?;
-        rec.barrier(
-            &[Access::StorageWrite],
-            &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead],
-        );
-        Ok(())
-    }
-
-    /// Records the same into as many layers of attachments: `colour` of the renderer's format, `depth` of `D32Float`. The picture between
-    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then.
-    pub fn record_draw(
-        &self,
-        rec: &mut Recorder,
-        views: &[View],
-        look: &Look,
-        colour: &Image,
-        depth: &Image,
-        size: [u32; 2],
-    ) -> Result<()> {
-        self.current()?;
-        let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
-        let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
-        let picture = match presented.take().filter(fits) {
-            Some(picture) => picture,
-            None => Picture::new(&self.subject.gpu, size, views.len())?,
-        };
-        let picture = presented.insert(picture);
-        self.record_picture(rec, views, look, picture)?;
-        rec.stage(stages::PRESENT)?;
-        self.present.record(rec, picture, colour, depth)?;
-        rec.end_stage()?;
-        Ok(())
-    }
-
-    /// Draws both eyes, or any one to four views ([`View::MAX`]), on the device's own queue and reads them back. Refuses while the ambient
-    /// volume is out of date.
-    pub fn draw<const VIEWS: usize>(
-        &self,
-        views: &[View; VIEWS],
-        look: &Look,
-        size: [u32; 2],
-    ) -> Result<(StereoImage<VIEWS>, Timings)> {
-        self.current()?;
-        if size.contains(&0) {
-            let problem = format!("{} x {}; expected at least 1 x 1 pixels", size[0], size[1]);
-            return Err(Error::refused("image size", problem));
-        }
-        let gpu = &self.subject.gpu;
-        let picture = Picture::new(gpu, size, VIEWS)?;
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let read_back = |bytes| gpu.buffer("image read-back", bytes, BufferUse::Readback);
-        let colours = (0..VIEWS).map(|_| read_back(16 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
-        let depths = (0..VIEWS).map(|_| read_back(4 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
-
-        let mut rec = gpu.recorder("draw")?;
-        self.record_picture(&mut rec, views, look, &picture)?;
-        for eye in 0..VIEWS {
-            let extent = [size[0], size[1], 1];
-            rec.copy_image_to_buffer(&picture.colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
-            rec.copy_image_to_buffer(&picture.depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
-        }
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-        let timings = rec.submit_and_wait()?;
-
-        let mut image = StereoImage {
-            size,
-            colour: std::array::from_fn(|_| Vec::new()),
-            depth: std::array::from_fn(|_| Vec::new()),
-        };
-        for view in 0..VIEWS {
-            let read = |buffer: &Buffer| buffer.read(0, buffer.bytes());
-            image.colour[view] = bytemuck::pod_collect_to_vec(&read(&colours[view])?);
-            image.depth[view] = bytemuck::pod_collect_to_vec(&read(&depths[view])?);
-        }
-        Ok((image, timings))
-    }
-
     /// Brings V_o alone up to date; V_AO goes out of date, so that the next update computes everything. Uses the device's queue and waits
     /// for it.
     pub(crate) fn update_opacity(&mut self) -> Result<()> {
-        let mut parts = self.parts();
+        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
+        let mut parts = self.parts(changed);
         parts.retain(|part| matches!(part.stage().phase, Phase::Opacity | Phase::Clip));
         drive::run(&self.subject.gpu, &parts, &mut Pace::default(), &mut |_| ())?;
-        drop(parts);
-        self.changed = Changed::ALL;
         Ok(())
     }
 

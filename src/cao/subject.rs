@@ -76,6 +76,11 @@ impl Subject {
         clip_set.prepare(gpu, peel, dilate, clips, radius_mm, half_mm, setup.maps)
     }
 
+    /// Whether every clip mesh has its maps: not after making them failed.
+    pub(crate) fn clips_are_prepared(&self) -> bool {
+        self.clip_set.fits(&self.clips)
+    }
+
     /// The transfer function's table, and the bricks that it gives opacity.
     pub(crate) fn occupancy(&self) -> Part<'_> {
         Part::short(stages::OCCUPANCY, |rec| {

@@ -36,7 +36,7 @@
 //!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
 //!     ## target_mm = [0, 0, 0]
 //!     ## up = [0, 0, 1]
-//!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance, at most 63
+//!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance
 //!     fov_deg = 35                     # vertical
 //!     screen_mm = 400                  # distance of the plane without parallax; default: the target
 //!
@@ -203,7 +203,7 @@ impl OcclusionSettings {
 pub struct Stereo {
     /// Where they are and where they look.
     pub viewpoint: Viewpoint,
-    /// Distance between the eyes in mm; `None` is 1/15 of the distance to the target, at most 63 mm.
+    /// Distance between the eyes in mm; `None` is 1/15 of the distance to the target.
     pub ipd_mm: Option<f32>,
     /// Vertical field of view in degrees; `None` is that of [`StereoRig::framing`].
     pub fov_deg: Option<f32>,
@@ -259,7 +259,7 @@ impl Stereo {
             rig.position = rig.position.normalize() * distance;
         }
         // Framing's own rule, for the distance that it has become.
-        let comfortable = ((rig.target - rig.position).length() / 15.0).min(63.0);
+        let comfortable = (rig.target - rig.position).length() * StereoRig::PARALLAX;
         rig.ipd_mm = self.ipd_mm.unwrap_or(comfortable);
         rig.fov_deg = self.fov_deg.unwrap_or(rig.fov_deg);
         rig.screen_mm = self.screen_mm;

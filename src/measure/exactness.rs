@@ -164,11 +164,8 @@ pub fn random_clip(random: &mut Random, renderer: &Renderer, shape: &Shape, turn
         _ => 1.0,
     };
     let scale = Vec3::from_array([(); 3].map(|()| random.between(low, high))) / unit;
-    let pose = Pose {
-        translate_mm: place,
-        rotate_deg: Vec3::from_array([(); 3].map(|()| random.between(-180.0, 180.0))),
-        scale: scale.max(Vec3::splat(1e-3)),
-    };
+    let rotate_deg = Vec3::from_array([(); 3].map(|()| random.between(-180.0, 180.0)));
+    let pose = Pose { translate_mm: place, rotate_deg, scale };
     let mode = if random.below(3) == 0 { Mode::Keep } else { Mode::Remove };
     Clip { shape: shape.clone(), mode, pose }
 }

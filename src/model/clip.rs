@@ -43,6 +43,18 @@ impl Shape {
         }
     }
 
+    /// Largest coordinate of its points in local units; none of a half-space.
+    fn size(&self) -> Option<f32> {
+        match self {
+            Self::Plane => None,
+            Self::Mesh(mesh) => {
+                let (low, high) = mesh.bounds();
+                Some(low.abs().max(high.abs()).max_element())
+            }
+            _ => Some(1.0),
+        }
+    }
+
     /// The analytic shape called `name`.
     pub fn parse(name: &str) -> Result<Self> {
         Self::ANALYTIC.into_iter().find(|shape| shape.name() == name).ok_or_else(|| Error::Config {
@@ -128,17 +140,17 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// Refuses poses that are not finite or whose scale is outside 1e-3 … 1e6.
+    /// Refuses what is no pose in any volume: numbers that are not finite, scales that are not above 0.
     pub fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
-        if !self.translate_mm.is_finite() || self.translate_mm.abs().max_element() > 1e6 {
-            return refuse("clip translation", format!("{} mm; expected at most 1e6", self.translate_mm));
+        if !self.translate_mm.is_finite() {
+            return refuse("clip translation", format!("{} mm; expected numbers", self.translate_mm));
         }
         if !self.rotate_deg.is_finite() {
             return refuse("clip rotation", format!("{} degrees; expected numbers", self.rotate_deg));
         }
-        if !(self.scale.min_element() >= 1e-3 && self.scale.max_element() <= 1e6) {
-            return refuse("clip scale", format!("{}; expected 0.001 … 1e6 on each axis", self.scale));
+        if !(self.scale.is_finite() && self.scale.min_element() > 0.0) {
+            return refuse("clip scale", format!("{}; expected a number > 0 on each axis", self.scale));
         }
         Ok(())
     }
@@ -175,6 +187,38 @@ impl Clip {
         Self { shape, mode: Mode::Remove, pose: Pose::default() }
     }
 
+    /// How much farther away or larger than the volume's half diagonal a clip may be, and how much smaller: beyond, f32 has no digits left
+    /// for the place of its surface.
+    const MOST: f32 = 1e7;
+
+    /// Refuses poses that are none, or none in a volume whose half diagonal is `half_mm`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] naming what is refused, and the lengths that would do.
+    pub fn check(&self, half_mm: f32) -> Result<()> {
+        self.pose.check()?;
+        let (shape, most) = (self.shape.name(), Self::MOST * half_mm);
+        let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
+        if self.pose.translate_mm.abs().max_element() > most {
+            let problem = format!(
+                "{} mm of {shape}; expected at most {most:e} mm in this volume",
+                self.pose.translate_mm
+            );
+            return refuse("clip translation", problem);
+        }
+        let least = half_mm / Self::MOST;
+        // A half-space has no size.
+        let Some(size) = self.shape.size() else { return Ok(()) };
+        if !(self.pose.scale.min_element() * size >= least && self.pose.scale.max_element() * size <= most) {
+            let sizes = self.pose.scale * size;
+            let problem = format!(
+                "{shape} is {sizes} mm large; expected {least:e} … {most:e} mm along each axis in this volume"
+            );
+            return refuse("clip scale", problem);
+        }
+        Ok(())
+    }
+
     /// Whether an analytic clip hides this world point (mm); `None` for a mesh. A point on the surface is visible,
     /// as in CAO eq. (1).
     pub fn hides(&self, world: Vec3) -> Option<bool> {
@@ -186,14 +230,10 @@ impl Clip {
     /// half diagonal is `half_mm`. For a mesh it is a thousandth of the radius where that is enough, else the next power of
     /// two, so that a mesh that moves rarely needs new maps.
     pub fn rounding_mm(&self, half_mm: f32, radius_mm: f32) -> f32 {
-        let size = match &self.shape {
-            Shape::Mesh(mesh) => {
-                let (low, high) = mesh.bounds();
-                low.abs().max(high.abs()).max_element()
-            }
-            _ => 1.0,
-        };
-        let extent = self.pose.translate_mm.length() + 2.0 * size * self.pose.scale.max_element() + half_mm;
+        let size = self.shape.size().unwrap_or(0.0);
+        // In f64, which holds the square of every f32.
+        let away = self.pose.translate_mm.as_dvec3().length() as f32;
+        let extent = away + 2.0 * size * self.pose.scale.max_element() + half_mm;
         // A handful of operations on numbers of this size, each right to half a unit in the last place.
         let bound = 16.0 * f32::EPSILON * extent;
         match self.shape {
@@ -237,7 +277,7 @@ impl ClipCamera {
         let (low, high) = (low * scale - margin_mm, high * scale + margin_mm);
         let size = high - low;
         // One pixel of border on each side keeps silhouettes off the map's edge, and faces off its first and last depth.
-        let pixel_mm = (size.x.max(size.y) / (resolution - 2) as f32).max(1e-6);
+        let pixel_mm = (size.x.max(size.y) / (resolution - 2) as f32).max(f32::EPSILON * size.z);
         let centre = (low + high) * 0.5;
         let edge = pixel_mm * resolution as f32;
         Self {

@@ -137,9 +137,11 @@ pub struct StereoRig {
 }
 
 impl StereoRig {
+    /// A comfortable distance of the eyes, as a share of that to what they look at.
+    pub const PARALLAX: f32 = 1.0 / 15.0;
+
     /// A rig from whose place a volume of this size in mm just fits into a square picture, seen from the given azimuth
-    /// (about +z, from −y) and elevation in degrees. The eyes' distance is 1/15 of the viewing distance, at most 63 mm, a
-    /// comfortable parallax.
+    /// (about +z, from −y) and elevation in degrees. The eyes' distance is 1/15 of the viewing distance, a comfortable parallax.
     pub fn framing(size_mm: [f64; 3], azimuth_deg: f32, elevation_deg: f32) -> Self {
         let fov_deg = 35.0_f32;
         let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
@@ -155,12 +157,12 @@ impl StereoRig {
             let p = half * Vec3::new(sign(0), sign(1), sign(2));
             p.dot(from) + p.dot(right).abs().max(p.dot(above).abs()) / slope
         };
-        let distance = (0..8).map(fit).fold(1e-2, f32::max);
+        let distance = (0..8).map(fit).fold(0.0, f32::max);
         Self {
             position: from * distance,
             target: Vec3::ZERO,
             up,
-            ipd_mm: (distance / 15.0).min(63.0),
+            ipd_mm: distance * Self::PARALLAX,
             fov_deg,
             screen_mm: None,
         }
@@ -170,12 +172,15 @@ impl StereoRig {
     pub fn views(&self, aspect: f32, near_mm: f32, far_mm: f32) -> Result<[View; 2]> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
         let ahead = self.target - self.position;
-        if !ahead.is_finite() || ahead.length() < 1e-6 {
+        let Some(back) = (-ahead).try_normalize() else {
             return refuse(
                 "stereo.target",
-                format!("{} is the eyes' own place; expected another point", self.target),
+                format!(
+                    "{} is the eyes' own place {}, or as good as that; expected another point, nearer than 1e18 mm",
+                    self.target, self.position
+                ),
             );
-        }
+        };
         if !(self.ipd_mm >= 0.0 && self.ipd_mm.is_finite()) {
             return refuse("stereo.ipd_mm", format!("{}; expected a length >= 0 mm", self.ipd_mm));
         }
@@ -186,7 +191,6 @@ impl StereoRig {
         if !(screen > 0.0 && screen.is_finite()) {
             return refuse("stereo.screen_mm", format!("{screen}; expected a length > 0 mm"));
         }
-        let back = -ahead.normalize();
         let right = self.up.normalize_or_zero().cross(back);
         if right.length() < 1e-4 {
             return refuse("stereo.up", format!("{} is the viewing direction; expected another", self.up));

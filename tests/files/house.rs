@@ -264,6 +264,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "src/cao/renderer.rs",
         &["error", "host", "stages", "drive", "field", "draw", "subject", "ambient", "method"],
     ),
+    ("src/cao/renderer/", &["ambient", "clip"]),
     // Instruments take the renderer.
     ("src/cao/verify/", &["error", "host", "field", "cast", "draw", "ambient", "renderer"]),
     ("src/measure/failure.rs", &[]),

@@ -1,7 +1,7 @@
 //! The kernel `near` against its twin: which bricks an edit concerns.
 
 use cao::field::bricks::BrickList;
-use cao::field::near::{Bindings, FAR, Near, TODO};
+use cao::field::near::{Bindings, FAR, Near, TODO, VALUED};
 use cao_gpu::BufferUse;
 use cao_measure::random::Random;
 use cao_model::settings::Scope;
@@ -36,21 +36,24 @@ fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
             let contact = buffer(&gpu, "contact", bytemuck::cast_slice(&bits));
             let other = gpu.buffer("other", change.bytes(), BufferUse::Device).unwrap();
             // Whatever was to do before.
-            let todo = buffer(&gpu, "todo", &vec![255; 4 * all]);
+            let valued: Vec<bool> = (0..all).map(|_| random.below(3) == 0).collect();
+            let before: Vec<u32> = valued.iter().map(|valued| if *valued { !0 } else { !VALUED }).collect();
+            let todo = buffer(&gpu, "todo", bytemuck::cast_slice(&before));
             let list = BrickList::new(&gpu, &field).unwrap();
             let b = Bindings { change: &change, other: &other, contact: &contact, todo: &todo, list: &list };
             run(&gpu, |rec| kernel.record(rec, &field, scope, reach, b).unwrap());
 
             let found: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &todo));
-            let expected = near(grid, &opacity, &changed, f64::from(reach), scope == Scope::All);
-            let words: Vec<u32> = expected.iter().map(|to_do| if *to_do { TODO } else { 0 }).collect();
+            let expected = near(grid, &opacity, &changed, &valued, f64::from(reach), scope == Scope::All);
+            let word = |[to_do, valued]: [bool; 2]| u32::from(to_do) * TODO + u32::from(valued) * VALUED;
+            let words: Vec<u32> = expected.iter().copied().map(word).collect();
             assert_eq!(found, words, "{grid:?} turn {turn}");
             // Each once, in any order, and one group for each.
             let mut listed: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &list.buffer));
-            let number = expected.iter().filter(|to_do| **to_do).count();
+            let number = expected.iter().filter(|brick| brick[0]).count();
             assert_eq!(listed[..4], [number as u32, u32::from(number > 0), 1, number as u32]);
             listed[4..4 + number].sort_unstable();
-            let places: Vec<u32> = (0..all as u32).filter(|&i| expected[i as usize]).collect();
+            let places: Vec<u32> = (0..all as u32).filter(|&i| expected[i as usize][0]).collect();
             assert_eq!(listed[4..4 + number], places, "{grid:?} turn {turn}");
             let after: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &change));
             assert_eq!(after, vec![FAR; all], "ready for the next edit");

@@ -358,6 +358,38 @@ fn volumes_are_drawn_with_flags_alone_also_negative_ones_and_the_smallest() {
     }
 }
 
+/// From a hundredth of an atom to the moon: the same numbers on another grid are the same picture, and verified alike.
+#[test]
+fn volumes_of_any_size_are_drawn_and_verified_alike() {
+    let folder = Folder::with_device();
+    let drawn = |unit: &str| {
+        let lengths = format!(
+            "--radius-mm 5{unit} --clip sphere --clip-scale 8{unit} --clip-translate 6{unit},-6{unit},6{unit}"
+        );
+        let volume = format!("builtin:engine:24:1{unit},1{unit},1.5{unit}");
+        folder.ok(&format!("render {volume} {lengths} --size 40x40 -o near.png"));
+        folder.ok(&format!("render {volume} {lengths} --size 40x40 --distance 70{unit} -o far.png"));
+        ["near.png", "far.png"].map(|name| picture(&folder, name))
+    };
+    let ordinary = drawn("");
+    for unit in ["e-9", "e-6", "e-3", "e3", "e6", "e8"] {
+        for (found, expected) in drawn(unit).iter().zip(&ordinary) {
+            let apart = found.as_raw().iter().zip(expected.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(apart <= Some(1), "{unit}: {apart:?} levels");
+        }
+    }
+    assert!(ordinary[0].pixels().filter(|p| p.0[1] > 80).count() > 300, "much is seen");
+    for unit in ["1e-9", "1e-6", "1e6"] {
+        let answer =
+            folder.json(&format!("verify builtin:fruit:24:{unit},{unit},{unit} --poses 2 --method all"));
+        assert_eq!(answer["exact"], true, "{answer}");
+    }
+    // What f32 cannot place is refused, in shares of the volume.
+    let run = folder.run("render builtin:engine:24:1e-6,1e-6,1e-6 --clip sphere --clip-scale 1000 -o s.png");
+    assert_eq!(run.code, Some(1));
+    assert!(run.err.contains("clip scale") && run.err.contains("in this volume"), "{}", run.err);
+}
+
 /// What is chosen is what is computed, within what the flags leave open, and both budgets refuse the impossible.
 #[test]
 fn a_budget_chooses_among_what_the_flags_leave_open_and_says_what_it_measured() {

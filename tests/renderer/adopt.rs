@@ -1,10 +1,10 @@
 //! A host with its own Vulkan: its device is used, its command buffer recorded into, and its handles survive.
 
-use ash::vk;
+use crate::host::Host;
 use cao::renderer::Renderer;
 use cao_gpu::Access::*;
 use cao_gpu::Error;
-use cao_gpu::{Adopted, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase, Stage, ValidationLog};
+use cao_gpu::{BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase, Stage, ValidationLog};
 use cao_model::clip::{Clip, Shape};
 use cao_model::look::Look;
 use cao_model::settings::Setup;
@@ -12,133 +12,14 @@ use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_testing::methods;
 use cao_testing::wgsl::{bind, compile};
-use std::ffi::{CStr, c_void};
-use std::sync::Mutex;
 
 const FIRST: Stage = Stage::new("first", Phase::Ambient);
 const SECOND: Stage = Stage::new("second", Phase::Draw);
 
-/// What the validation layer said to the host.
-static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
-
-unsafe extern "system" fn listen(
-    _: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    _: *mut c_void,
-) -> vk::Bool32 {
-    // SAFETY: Vulkan passes a valid message.
-    let text = unsafe { (*data).message_as_c_str() }.map(CStr::to_string_lossy).unwrap_or_default();
-    MESSAGES.lock().unwrap().push(text.into_owned());
-    vk::FALSE
-}
-
-/// A minimal engine.
-struct Host {
-    entry: ash::Entry,
-    instance: ash::Instance,
-    physical: vk::PhysicalDevice,
-    device: ash::Device,
-    family: u32,
-    queue: vk::Queue,
-    pool: vk::CommandPool,
-}
-
-impl Host {
-    fn new() -> Self {
-        // SAFETY: the calls follow Vulkan's rules; everything passed lives during its call.
-        unsafe {
-            let entry = ash::Entry::load().unwrap();
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-            let layers: Vec<_> = cao_testing::validated()
-                .then_some(c"VK_LAYER_KHRONOS_validation".as_ptr())
-                .into_iter()
-                .collect();
-            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
-            let mut messenger = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                .message_severity(
-                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
-                        | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-                )
-                .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
-                .pfn_user_callback(Some(listen));
-            let create = vk::InstanceCreateInfo::default()
-                .application_info(&application)
-                .enabled_layer_names(&layers)
-                .enabled_extension_names(&extensions)
-                .push_next(&mut messenger);
-            let instance = entry.create_instance(&create, None).unwrap();
-            let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-            let (physical, family) = instance
-                .enumerate_physical_devices()
-                .unwrap()
-                .into_iter()
-                .find_map(|p| {
-                    let families = instance.get_physical_device_queue_family_properties(p);
-                    Some((p, families.iter().position(|f| f.queue_flags.contains(wanted))? as u32))
-                })
-                .unwrap();
-            let queues =
-                [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-            let extensions: Vec<_> = Gpu::required_extensions().iter().map(|name| name.as_ptr()).collect();
-            let mut features = Gpu::required_features();
-            let mut chain = features.chain();
-            let create = vk::DeviceCreateInfo::default()
-                .queue_create_infos(&queues)
-                .enabled_extension_names(&extensions)
-                .push_next(&mut chain);
-            let device = instance.create_device(physical, &create, None).unwrap();
-            let queue = device.get_device_queue(family, 0);
-            let pool = vk::CommandPoolCreateInfo::default().queue_family_index(family);
-            let pool = device.create_command_pool(&pool, None).unwrap();
-            Self { entry, instance, physical, device, family, queue, pool }
-        }
-    }
-
-    fn begin(&self) -> vk::CommandBuffer {
-        let allocate =
-            vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
-        // SAFETY: the pool is alive.
-        unsafe {
-            let cmd = self.device.allocate_command_buffers(&allocate).unwrap()[0];
-            self.device.begin_command_buffer(cmd, &Default::default()).unwrap();
-            cmd
-        }
-    }
-
-    fn submit_and_wait(&self, list: &[vk::CommandBuffer]) {
-        // SAFETY: the command buffers are recording and of this device.
-        unsafe {
-            list.iter().for_each(|cmd| self.device.end_command_buffer(*cmd).unwrap());
-            let submit = [vk::SubmitInfo::default().command_buffers(list)];
-            self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
-            self.device.queue_wait_idle(self.queue).unwrap();
-        }
-    }
-
-    fn destroy(self) {
-        // SAFETY: nothing made of them is alive any more.
-        unsafe {
-            self.device.destroy_command_pool(self.pool, None);
-            self.device.destroy_device(None);
-            self.instance.destroy_instance(None);
-        }
-    }
-}
-
 #[test]
 fn a_host_keeps_its_handles_and_its_queue() {
     let host = Host::new();
-    let adopted = Adopted {
-        entry: host.entry.clone(),
-        instance: host.instance.clone(),
-        physical_device: host.physical,
-        device: host.device.clone(),
-        queue_family: host.family,
-        queue: None,
-    };
-    // SAFETY: the handles belong together, have what is required, and outlive `gpu`.
-    let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
+    let gpu = host.adopted(None);
     assert!(
         matches!(gpu.recorder("ours"), Err(Error::Config { problem, .. }) if problem.contains("record_into"))
     );
@@ -196,7 +77,6 @@ fn a_host_keeps_its_handles_and_its_queue() {
     let cmd = host.begin();
     host.submit_and_wait(&[cmd]);
     host.destroy();
-    assert_eq!(*MESSAGES.lock().unwrap(), [] as [&str; 0]);
 }
 
 /// The embedding as the README describes it: the renderer is made with a lent queue, the frame goes into the host's own command
@@ -204,16 +84,7 @@ fn a_host_keeps_its_handles_and_its_queue() {
 #[test]
 fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
     let host = Host::new();
-    let adopted = Adopted {
-        entry: host.entry.clone(),
-        instance: host.instance.clone(),
-        physical_device: host.physical,
-        device: host.device.clone(),
-        queue_family: host.family,
-        queue: Some(host.queue),
-    };
-    // SAFETY: the handles belong together, have what is required, and outlive `gpu`; the queue is used by this thread alone.
-    let gpu = unsafe { Gpu::adopt(adopted) }.unwrap();
+    let gpu = host.adopted(Some(host.queue));
     let volume = cao_formats::open("builtin:fruit:16").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     for method in methods() {
@@ -264,7 +135,6 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
     assert_eq!(gpu.memory_report(), []);
     drop(gpu);
     host.destroy();
-    assert_eq!(*MESSAGES.lock().unwrap(), [] as [&str; 0]);
 }
 
 #[test]

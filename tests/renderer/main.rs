@@ -1,4 +1,4 @@
-//! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, leaks, budgets.
+//! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, failures, leaks, budgets.
 
 mod adopt;
 mod calls;
@@ -7,9 +7,14 @@ mod contextual;
 mod edits;
 mod embed;
 mod exactness;
+mod failures;
+mod frames;
+mod host;
 mod leaks;
+mod lengths;
 mod limits;
 mod methods;
 mod planner;
 mod real_data;
+mod scenes;
 mod stability;

@@ -96,7 +96,7 @@ impl ClipSet {
         half_mm: f32,
         settings: MapSettings,
     ) -> Result<Timings> {
-        check(clips)?;
+        check(clips, half_mm)?;
         settings.check()?;
         let mut wanted = Vec::new();
         for clip in clips {
@@ -189,9 +189,14 @@ impl ClipSet {
         Ok(timings)
     }
 
+    /// Whether the maps of all meshes among these clips are there.
+    pub(crate) fn fits(&self, clips: &[Clip]) -> bool {
+        self.meshes.len() == clips.iter().filter(|clip| matches!(clip.shape, Shape::Mesh(_))).count()
+    }
+
     /// Writes the clips at their poses and makes them visible to all shaders. Meshes must have been prepared.
     pub fn record(&self, rec: &mut Recorder, clips: &[Clip], half_mm: f32) -> Result<()> {
-        check(clips)?;
+        check(clips, half_mm)?;
         let mut data = Clips::zeroed();
         data.count = clips.len() as u32;
         let mut meshes = self.meshes.iter();
@@ -199,7 +204,9 @@ impl ClipSet {
             let rows = clip.pose.rotation().transpose();
             let moved = -(rows * clip.pose.translate_mm);
             slot.to_rigid = std::array::from_fn(|i| rows.row(i).extend(moved[i]).to_array());
-            slot.scale = clip.pose.scale.extend(clip.pose.scale.min_element()).to_array();
+            // That of a half-space says nothing.
+            let scale = if matches!(clip.shape, Shape::Plane) { Vec3::ONE } else { clip.pose.scale };
+            slot.scale = scale.extend(scale.min_element()).to_array();
             slot.keep = u32::from(clip.mode == Mode::Keep);
             slot.cells[3] = clip.rounding_mm(half_mm, 0.0);
             slot.kind = match &clip.shape {
@@ -211,7 +218,10 @@ impl ClipSet {
                 Shape::Torus => kinds::TORUS,
                 Shape::Mesh(mesh) => {
                     let map = meshes.next().ok_or_else(|| {
-                        Error::refused(&format!("clip {}", mesh.name), "its depth layers were not prepared")
+                        Error::refused(
+                            &format!("clip {}", mesh.name),
+                            "its depth layers could not be made; call set_clips again",
+                        )
                     })?;
                     slot.corner = map.camera.corner.extend(1.0 / map.camera.pixel_mm).to_array();
                     slot.pairs = map.pairs;
@@ -265,7 +275,7 @@ fn block_bounds(depth: &[f32], resolution: usize) -> Vec<f32> {
     bounds
 }
 
-fn check(clips: &[Clip]) -> cao_model::Result<()> {
+fn check(clips: &[Clip], half_mm: f32) -> cao_model::Result<()> {
     if clips.len() > Clip::MAX {
         return Err(cao_model::Error::Limit {
             what: "clips".into(),
@@ -274,5 +284,5 @@ fn check(clips: &[Clip]) -> cao_model::Result<()> {
             hint: "join meshes into one file, or leave some out".into(),
         });
     }
-    clips.iter().try_for_each(|clip| clip.pose.check())
+    clips.iter().try_for_each(|clip| clip.check(half_mm))
 }

@@ -50,9 +50,7 @@ impl Dilate {
             cell_mm: clip.cells.pixel_mm,
             depth_mm: camera.depth_mm,
             flags: if clip.keep { kernel::KEEP } else { 0 } | if clip.literal { kernel::LITERAL } else { 0 },
-            first: ((clip.cells.corner - camera.corner) / camera.pixel_mm).truncate().to_array(),
             per_cell: clip.cells.pixel_mm / camera.pixel_mm,
-            pad: Default::default(),
         };
         let over = [clip.cells.resolution, clip.cells.resolution, clip.pairs];
         let push = bytemuck::bytes_of(&params);

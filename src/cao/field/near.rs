@@ -1,8 +1,9 @@
-//! Which bricks an edit concerns (method.md §5.2): `todo(b) ⇔ needed(b) ∧ min_{b' changed} d(b, b') ≤ reach`, with d the
-//! distance in mm of the nearest voxels of two bricks, by a separable Euclidean distance transform.
+//! Which bricks an edit concerns (method.md §5.2): `todo(b) ⇔ (needed(b) ∨ valued(b)) ∧ min_{b' changed} d(b, b') ≤ reach`, with d the
+//! distance in mm of the nearest voxels of two bricks, by a separable Euclidean distance transform; *valued* are bricks that needed values
+//! so far, which hold 1 again where they no longer do.
 //!
 //! In and out: `change` (f32 a brick: squared distance, 0 where changed, [`FAR`] elsewhere; holds [`FAR`] again afterwards).
-//! In: `contact` of [`crate::clip::carve`]. Out: `todo` (a u32 a brick), and their `list`. Cost: a few reads a brick and axis.
+//! In: `contact` of [`crate::clip::carve`]. In and out: `todo` (a u32 a brick: [`TODO`], [`VALUED`]). Out: their `list`. Cost: a few reads a brick and axis.
 
 use crate::field::Field;
 use crate::field::bricks::BrickList;
@@ -12,7 +13,7 @@ use cao_gpu::{Access, Buffer, Gpu, Pipeline, Recorder};
 use cao_kernels::near as kernel;
 use cao_model::settings::Scope;
 
-pub use cao_kernels::shared::todo::TODO;
+pub use cao_kernels::shared::todo::{TODO, VALUED};
 pub use kernel::FAR;
 
 /// What the kernel reads and writes.
@@ -24,7 +25,7 @@ pub struct Bindings<'a> {
     pub other: &'a Buffer,
     /// Where each brick's opacity lies.
     pub contact: &'a Buffer,
-    /// [`TODO`] or 0 for each brick, u32 each.
+    /// [`TODO`] and [`VALUED`] of each brick, u32 each; 0 where V_AO holds 1.
     pub todo: &'a Buffer,
     /// The bricks to do.
     pub list: &'a BrickList,

@@ -1,6 +1,7 @@
 //! Rays by brick with contextual updates from change (method.md §4, §5.2): V_o is brought up to date in place and compared with what V_AO
 //! was computed from; bricks within reach of a change are computed anew, with one write a voxel, and no other brick is touched. Exact for
-//! any edit, clips, transfer function, values, radius: a value depends on nothing but the opacities that its rays meet.
+//! any edit, clips, transfer function, values, radius: a value depends on nothing but the opacities that its rays meet. What needs no
+//! value holds 1, whatever it held before.
 //!
 //! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, and some 32 bytes a brick of 512.
 
@@ -25,7 +26,7 @@ struct Volumes {
     opacity: Image,
     /// V_AO, r16unorm.
     ambient: Image,
-    /// Bricks that the last update computed, u32 each.
+    /// Bricks that the last update computed, and those that have values, u32 each.
     todo: Buffer,
     /// What the clips do to each brick, u32 each.
     clip_bricks: Buffer,
@@ -126,10 +127,6 @@ impl Traced {
         let all = [Access::StorageRead, Access::StorageWrite];
         Part::short(stages::CARVE, move |rec| {
             on.record_clips(rec)?;
-            if changed.anew {
-                rec.fill(&v.change, 0, v.change.bytes(), 0)?;
-                rec.barrier(&[Access::TransferWrite], &all);
-            }
             k.clip_bricks.record(rec, &on.field, &on.clip_set, 0.0, &v.clip_bricks)?;
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
             k.carve.record(
@@ -159,10 +156,17 @@ impl Traced {
         Part::short(stages::DIRECTIONS, |rec| Ok(self.kernels.rays.record_directions(rec, &self.plan)?))
     }
 
-    /// From changed bricks to those to compute.
-    fn choose<'a>(&'a self, to: Target<'a>) -> Part<'a> {
+    /// From changed bricks to those to compute: all that need values if `anew`, whatever there was before.
+    fn choose<'a>(&'a self, to: Target<'a>, anew: bool) -> Part<'a> {
         let (k, v) = (&self.kernels, &self.volumes);
         Part::short(stages::CHOOSE, move |rec| {
+            if anew {
+                rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
+                rec.fill(&v.change, 0, v.change.bytes(), 0)?;
+                rec.fill(to.todo, 0, to.todo.bytes(), 0)?;
+                rec.clear_image(to.ambient, [1.0; 4])?;
+                rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+            }
             let bindings = near::Bindings {
                 change: &v.change,
                 other: &v.other,
@@ -212,7 +216,7 @@ impl Ambient for Traced {
         if changed.anew {
             parts.push(self.directions());
         }
-        parts.extend([self.carve(on, changed), self.choose(to), self.trace(to)]);
+        parts.extend([self.carve(on, changed), self.choose(to, changed.anew), self.trace(to)]);
         parts
     }
 
@@ -231,12 +235,7 @@ impl Ambient for Traced {
         let list = BrickList::new(&on.gpu, &on.field)?;
         let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
         let to = Target { on, todo: &todo, list: &list, ambient: into };
-        let everything = Part::short(stages::CHOOSE, |rec| {
-            rec.fill(&v.change, 0, v.change.bytes(), 0)?;
-            rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-            Ok(())
-        });
-        let parts = [everything, self.choose(to), self.trace(to)];
+        let parts = [self.choose(to, true), self.trace(to)];
         let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);
         Ok((Recomputation { list, recomputed: Recomputed::Bricks(&v.todo) }, timings))

@@ -176,9 +176,9 @@ pub struct Render {
     #[arg(long, value_name = "DEG", value_parser = elevation, allow_hyphen_values = true)]
     pub elevation: Option<f32>,
     /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
-    #[arg(long, value_name = "MM", value_parser = distance, allow_hyphen_values = true)]
+    #[arg(long, value_name = "MM", value_parser = positive, allow_hyphen_values = true)]
     pub distance: Option<f32>,
-    /// Distance between the eyes in mm [default: 1/15 of that distance, at most 63]
+    /// Distance between the eyes in mm [default: 1/15 of that distance]
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
     /// Draw without ambient occlusion
@@ -417,11 +417,6 @@ fn scale(text: &str) -> Result<[f32; 3], String> {
         Err(_) => three(text, &[',']).ok_or("expected one number or three, SX,SY,SZ")?,
     };
     posed(factors, |pose, factors| pose.scale = factors)
-}
-
-/// A head nearer to the volume's centre than this has no direction to look in.
-fn distance(text: &str) -> Result<f32, String> {
-    number(text, "a length > 0 mm, at least 0.001", |mm| mm >= 1e-3)
 }
 
 fn angle(text: &str) -> Result<f32, String> {

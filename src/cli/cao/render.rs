@@ -45,7 +45,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     }
     let size = [scene.image.width, scene.image.height];
     let rig = scene.stereo.rig(volume.size_mm());
-    let reach = (rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>()).max(1.0);
+    let reach = rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>();
     let views = rig.views(size[0] as f32 / size[1] as f32, reach * 1e-4, reach * 2.0)?;
     targets.spare_inputs()?;
     progress.stage("preparing");

@@ -36,7 +36,7 @@ pub fn views(size_mm: [f64; 3], aspect: f32, count: usize, frame: i64) -> Result
         rig.ipd_mm = 0.0;
     }
     // As `cao render` has them.
-    let reach = (rig.position.length() + size_mm.iter().map(|s| *s as f32).sum::<f32>()).max(1.0);
+    let reach = rig.position.length() + size_mm.iter().map(|s| *s as f32).sum::<f32>();
     let eyes = rig.views(aspect, reach * 1e-4, reach * 2.0)?;
     Ok(match count {
         1 => vec![eyes[0]],

@@ -313,7 +313,7 @@ fn one(
     say: &mut dyn FnMut(&str, &Work),
 ) -> Result<SceneChart> {
     say("preparing", work);
-    let far = 3.0 * (scene.rig.position - scene.rig.target).length().max(1.0);
+    let far = 3.0 * (scene.rig.position - scene.rig.target).length();
     let views = scene.rig.views(plan.size[0] as f32 / plan.size[1] as f32, 0.02 * far, far)?;
     let arena = Arena { gpu, volume: &scene.volume, views: &views, size: plan.size };
     let mut stand = Stand::new(arena, scene)?;

@@ -23,9 +23,9 @@ use glam::{DVec3, Vec2, Vec3};
 pub const TOLERANCE: f64 = 0.5;
 /// The ambient factor is shown times this: a flat wall's is ½.
 pub const GAIN: f64 = 2.0;
-/// Below this gradient of opacity per mm there is no surface, and the diffuse term is 1.
-pub const FLAT_PER_MM: f64 = 1e-4;
-const _: () = assert!(FLAT_PER_MM as f32 == kernel::FLAT_PER_MM);
+/// Below this gradient of opacity per smallest spacing there is no surface, and the diffuse term is 1.
+pub const FLAT: f64 = 1e-4;
+const _: () = assert!(FLAT as f32 == kernel::FLAT);
 
 /// What is drawn; fields are x fastest.
 #[derive(Clone, Copy)]
@@ -215,7 +215,7 @@ fn surface(frame: &Frame, position: [f64; 3]) -> f64 {
         };
         (beside(1.0) - beside(-1.0)) / (2.0 * frame.grid.spacing[axis])
     }));
-    if gradient.length() < FLAT_PER_MM {
+    if gradient.length() * frame.grid.min_spacing() < FLAT {
         return 1.0;
     }
     gradient.normalize().dot(frame.look.light.as_dvec3()).abs()

@@ -1,12 +1,19 @@
-//! Which bricks an edit concerns (method.md §5.2): those with a voxel that needs a value, and with a voxel within `reach` mm of a
-//! voxel of a changed brick.
+//! Which bricks an edit concerns (method.md §5.2): those with a voxel within `reach` mm of a voxel of a changed brick that need a value, or
+//! have some that nothing needs any more.
 
 use crate::Grid;
 use crate::field::bricks::{EDGE, bricks};
 
-/// Whether each brick of [`bricks`] is to be computed. A voxel needs a value if it or a neighbour has opacity; all do if
-/// `unneeded`.
-pub fn near(grid: &Grid, opacity: &[u16], changed: &[bool], reach_mm: f64, unneeded: bool) -> Vec<bool> {
+/// Of each brick of [`bricks`]: whether it is to be computed, and whether it has values then, where `valued` says which had some before. A
+/// voxel needs a value if it or a neighbour has opacity; all do if `unneeded`.
+pub fn near(
+    grid: &Grid,
+    opacity: &[u16],
+    changed: &[bool],
+    valued: &[bool],
+    reach_mm: f64,
+    unneeded: bool,
+) -> Vec<[bool; 2]> {
     let all = bricks(grid);
     let mut needed = vec![unneeded; all.len()];
     for i in 0..grid.len() {
@@ -28,7 +35,10 @@ pub fn near(grid: &Grid, opacity: &[u16], changed: &[bool], reach_mm: f64, unnee
     (0..all.len())
         .map(|i| {
             let close = |j: usize| changed[j] && apart(all.voxel(i), all.voxel(j)) <= reach_mm;
-            needed[i] && (0..all.len()).any(close)
+            match (0..all.len()).any(close) {
+                true => [needed[i] || valued[i], needed[i]],
+                false => [false, valued[i]],
+            }
         })
         .collect()
 }
@@ -46,12 +56,23 @@ mod tests {
         opacity[grid.index([35, 4, 4])] = 9;
         let changed = [true, false, false, false, false];
         // Nearest voxels of neighbours are half a millimetre apart, of the next bricks 4.5, then 8.5 and 12.5.
-        let found = |reach, unneeded| near(&grid, &opacity, &changed, reach, unneeded);
+        let chosen = |changed, reach, unneeded| {
+            near(&grid, &opacity, changed, &[false; 5], reach, unneeded)
+                .into_iter()
+                .map(|[to_do, _]| to_do)
+                .collect::<Vec<_>>()
+        };
+        let found = |reach, unneeded| chosen(&changed, reach, unneeded);
         assert_eq!(found(0.4, false), [false; 5]);
         assert_eq!(found(0.5, false), [false, true, false, false, false]);
         assert_eq!(found(12.4, false), [false, true, true, false, false]);
         assert_eq!(found(12.5, false), [false, true, true, false, true]);
         assert_eq!(found(4.5, true), [true, true, true, false, false]);
-        assert_eq!(near(&grid, &opacity, &[false; 5], 99.0, true), [false; 5]);
+        assert_eq!(chosen(&[false; 5], 99.0, true), [false; 5]);
+        // The first and the fourth have values that nothing needs; the fourth is out of reach.
+        assert_eq!(
+            near(&grid, &opacity, &changed, &[true, false, false, true, true], 4.5, false),
+            [[true, false], [true, true], [true, true], [false, true], [false, true]]
+        );
     }
 }

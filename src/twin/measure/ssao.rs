@@ -95,7 +95,7 @@ fn pixel(
             if surface.z < sample.z + settings.bias_mm {
                 return 0.0;
             }
-            let range = (settings.radius_mm / (point.z - surface.z).abs().max(1e-6)).min(1.0);
+            let range = settings.radius_mm / (point.z - surface.z).abs().max(settings.radius_mm);
             range * range * (3.0 - 2.0 * range)
         })
         .sum();

@@ -1,0 +1,139 @@
+//! Updates that fail on the way: the next one makes everything.
+
+use super::*;
+use crate::ambient::{Fields, Recomputation};
+use crate::clip::clips::ClipSet;
+use cao_gpu::OpenOptions;
+use cao_model::METHODS;
+use cao_model::builtin::builtin_box;
+use cao_model::clip::Shape;
+use cao_model::mesh::TriangleMesh;
+use cao_model::methods::Method;
+use glam::Vec3;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A place that no part has.
+const NOWHERE: usize = usize::MAX;
+
+/// A method whose updates have one more part, which fails.
+struct Failing {
+    method: Box<dyn Ambient>,
+    /// Before which of the others.
+    at: Arc<AtomicUsize>,
+}
+
+impl Ambient for Failing {
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+        let mut parts = self.method.update(on, changed);
+        let at = self.at.load(Ordering::Relaxed);
+        if at <= parts.len() {
+            parts.insert(at, Part::long(stages::LAO, |_| Err(Error::refused("part", "fails"))));
+        }
+        parts
+    }
+
+    fn fields(&self) -> Fields<'_> {
+        self.method.fields()
+    }
+
+    fn recompute(
+        &self,
+        on: &Subject,
+        into: &Image,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Recomputation<'_>, Timings)> {
+        self.method.recompute(on, into, progress)
+    }
+
+    fn mask(&self, on: &Subject) -> Result<Vec<u8>> {
+        self.method.mask(on)
+    }
+}
+
+fn open() -> Gpu {
+    let validation = std::env::var_os("CAO_VALIDATION").is_none_or(|value| value != "0");
+    Gpu::open(&OpenOptions { validation, ..OpenOptions::default() }).unwrap()
+}
+
+fn close(gpu: Gpu) {
+    let log = gpu.validation_log();
+    drop(gpu);
+    log.assert_clean().unwrap();
+}
+
+fn renderer(gpu: &Gpu, method: Method) -> Renderer {
+    let volume = builtin_box("engine", [20, 18, 22], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut setup = Setup::of(method, 1.0);
+    setup.occlusion.radius_mm = 4.0;
+    Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap()
+}
+
+fn clips(at: f32) -> Vec<Clip> {
+    let mesh = Shape::Mesh(Arc::new(TriangleMesh::cuboid()));
+    let placed = |shape, x: f32| {
+        let mut clip = Clip::remove(shape);
+        (clip.pose.scale, clip.pose.translate_mm.x) = (Vec3::splat(4.0), x);
+        clip
+    };
+    vec![placed(Shape::Sphere, at), placed(mesh, -at)]
+}
+
+#[test]
+fn an_update_that_failed_is_done_anew() {
+    let gpu = open();
+    for entry in METHODS {
+        let (mut failing, mut fresh) = (renderer(&gpu, entry.method), renderer(&gpu, entry.method));
+        let at = Arc::new(AtomicUsize::new(NOWHERE));
+        failing.ambient = Box::new(Failing { method: method::of(&failing.subject).unwrap(), at: at.clone() });
+        failing.update(&mut |_| ()).unwrap();
+        let mut failures = 0;
+        for place in 0..8 {
+            for recorded in [false, true] {
+                let clips = clips(place as f32 + if recorded { 0.5 } else { 0.0 });
+                failing.set_clips(&clips).unwrap();
+                at.store(place, Ordering::Relaxed);
+                let result = match recorded {
+                    true => failing.record_update(&mut gpu.recorder("dropped").unwrap()),
+                    false => failing.update(&mut |_| ()).map(drop),
+                };
+                assert_eq!(failing.current().is_err(), result.is_err(), "{} part {place}", entry.name);
+                match result {
+                    Err(_) => failures += 1,
+                    Ok(()) if recorded => failing.invalidate(),
+                    Ok(()) => (),
+                }
+                at.store(NOWHERE, Ordering::Relaxed);
+                failing.update(&mut |_| ()).unwrap();
+                fresh.set_clips(&clips).unwrap();
+                fresh.update(&mut |_| ()).unwrap();
+                let same = failing.read_ambient().unwrap() == fresh.read_ambient().unwrap();
+                assert!(same, "{} part {place}", entry.name);
+            }
+        }
+        // Before each of three parts at least, and behind the last.
+        assert!(failures >= 8, "{}: {failures}", entry.name);
+    }
+    close(gpu);
+}
+
+/// What is left where maps of clip meshes fail, and those before them cannot be made again either.
+#[test]
+fn maps_that_were_lost_are_made_by_the_next_update() {
+    let gpu = open();
+    for entry in METHODS {
+        let (mut without, mut fresh) = (renderer(&gpu, entry.method), renderer(&gpu, entry.method));
+        for renderer in [&mut without, &mut fresh] {
+            renderer.set_clips(&clips(3.0)).unwrap();
+            renderer.update(&mut |_| ()).unwrap();
+        }
+        without.subject.clip_set = ClipSet::new(&gpu).unwrap();
+        without.invalidate();
+        let error = without.record_update(&mut gpu.recorder("dropped").unwrap()).unwrap_err().to_string();
+        assert!(error.contains("set_clips"), "{error}");
+        without.update(&mut |_| ()).unwrap();
+        assert!(without.read_ambient().unwrap() == fresh.read_ambient().unwrap(), "{}", entry.name);
+    }
+    close(gpu);
+}

@@ -1,0 +1,132 @@
+//! A program with a Vulkan of its own, as small as one can be.
+
+use ash::vk;
+use cao_gpu::{Adopted, Gpu};
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
+/// What the validation layer said to the host.
+static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+unsafe extern "system" fn listen(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    _: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: Vulkan passes a valid message.
+    let text = unsafe { (*data).message_as_c_str() }.map(CStr::to_string_lossy).unwrap_or_default();
+    MESSAGES.lock().unwrap().push(text.into_owned());
+    vk::FALSE
+}
+
+/// A minimal engine.
+pub struct Host {
+    entry: ash::Entry,
+    instance: ash::Instance,
+    physical: vk::PhysicalDevice,
+    device: ash::Device,
+    family: u32,
+    pub queue: vk::Queue,
+    pool: vk::CommandPool,
+}
+
+impl Host {
+    pub fn new() -> Self {
+        // SAFETY: the calls follow Vulkan's rules; everything passed lives during its call.
+        unsafe {
+            let entry = ash::Entry::load().unwrap();
+            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+            let layers: Vec<_> = cao_testing::validated()
+                .then_some(c"VK_LAYER_KHRONOS_validation".as_ptr())
+                .into_iter()
+                .collect();
+            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+            let mut messenger = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
+                        | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+                .pfn_user_callback(Some(listen));
+            let create = vk::InstanceCreateInfo::default()
+                .application_info(&application)
+                .enabled_layer_names(&layers)
+                .enabled_extension_names(&extensions)
+                .push_next(&mut messenger);
+            let instance = entry.create_instance(&create, None).unwrap();
+            let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+            let (physical, family) = instance
+                .enumerate_physical_devices()
+                .unwrap()
+                .into_iter()
+                .find_map(|p| {
+                    let families = instance.get_physical_device_queue_family_properties(p);
+                    Some((p, families.iter().position(|f| f.queue_flags.contains(wanted))? as u32))
+                })
+                .unwrap();
+            let queues =
+                [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+            let extensions: Vec<_> = Gpu::required_extensions().iter().map(|name| name.as_ptr()).collect();
+            let mut features = Gpu::required_features();
+            let mut chain = features.chain();
+            let create = vk::DeviceCreateInfo::default()
+                .queue_create_infos(&queues)
+                .enabled_extension_names(&extensions)
+                .push_next(&mut chain);
+            let device = instance.create_device(physical, &create, None).unwrap();
+            let queue = device.get_device_queue(family, 0);
+            let pool = vk::CommandPoolCreateInfo::default().queue_family_index(family);
+            let pool = device.create_command_pool(&pool, None).unwrap();
+            Self { entry, instance, physical, device, family, queue, pool }
+        }
+    }
+
+    /// Its device, with or without its queue.
+    pub fn adopted(&self, queue: Option<vk::Queue>) -> Gpu {
+        let adopted = Adopted {
+            entry: self.entry.clone(),
+            instance: self.instance.clone(),
+            physical_device: self.physical,
+            device: self.device.clone(),
+            queue_family: self.family,
+            queue,
+        };
+        // SAFETY: the handles belong together and have what is required; tests destroy the host last and lend its queue to one thread.
+        unsafe { Gpu::adopt(adopted) }.unwrap()
+    }
+
+    /// A command buffer that is recording.
+    pub fn begin(&self) -> vk::CommandBuffer {
+        let allocate =
+            vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+        // SAFETY: the pool is alive.
+        unsafe {
+            let cmd = self.device.allocate_command_buffers(&allocate).unwrap()[0];
+            self.device.begin_command_buffer(cmd, &Default::default()).unwrap();
+            cmd
+        }
+    }
+
+    /// Ends and runs them in this order.
+    pub fn submit_and_wait(&self, list: &[vk::CommandBuffer]) {
+        // SAFETY: the command buffers are recording and of this device.
+        unsafe {
+            list.iter().for_each(|cmd| self.device.end_command_buffer(*cmd).unwrap());
+            let submit = [vk::SubmitInfo::default().command_buffers(list)];
+            self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
+            self.device.queue_wait_idle(self.queue).unwrap();
+        }
+    }
+
+    /// Destroys what is its own, and asserts that the validation layer had nothing to say.
+    pub fn destroy(self) {
+        // SAFETY: nothing made of them is alive any more.
+        unsafe {
+            self.device.destroy_command_pool(self.pool, None);
+            self.device.destroy_device(None);
+            self.instance.destroy_instance(None);
+        }
+        assert_eq!(*MESSAGES.lock().unwrap(), [] as [&str; 0]);
+    }
+}
