@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::settings::Setup;
-use cao_model::volume::Volume;
+use cao_model::volume::{Layout, Volume};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
 use std::fs::OpenOptions as FileOptions;
@@ -52,15 +52,16 @@ impl Out {
         self.json(json!({ "device": info.name, "driver": info.driver }));
     }
 
-    /// A volume's header.
+    /// A volume's header, axes as its file has them.
     pub fn volume(&mut self, name: &str, volume: &Volume) {
-        let ([x, y, z], [sx, sy, sz]) = (volume.dims, volume.spacing);
+        let Layout { dims, spacing, .. } = volume.stored_layout();
+        let ([x, y, z], [sx, sy, sz]) = (dims, spacing);
         self.line(format!(
             "volume    {name}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
             volume.values.kind()
         ));
         self.json(json!({
-            "volume": name, "dims": volume.dims, "spacing_mm": volume.spacing, "type": volume.values.kind()
+            "volume": name, "dims": dims, "spacing_mm": spacing, "type": volume.values.kind()
         }));
     }
 

@@ -1,8 +1,8 @@
 //! The scene file: everything that one picture needs, in TOML.
 //!
 //! Paths are relative to the scene file. Every key but `volume` may be left out. Unknown keys and impossible values are
-//! refused by name. Lengths are millimetres in the volume's frame (origin at its centre, axes as its index axes),
-//! angles degrees, colours sRGB.
+//! refused by name. Lengths are millimetres, angles degrees, colours sRGB. Clips with their meshes, eyes and light share one
+//! frame, whose origin is the volume's centre and whose axes `frame` chooses ([`Frame`]).
 //!
 //! ```
 //! let scene = cao_formats::Scene::from_toml(
@@ -10,6 +10,8 @@
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
+//!     frame = "patient"                # x right, y anterior, z superior where the volume's file states them, else its index
+//!                                      # axes; "index": always those, as stored
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
 //!
 //!     [[clip]]                         # none, one, or up to eight
@@ -29,7 +31,7 @@
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
-//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y
+//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y; 180: a patient's face
 //!     elevation_deg = 25
 //!     distance_mm = 400                # of the eyes from the centre; default: it fills the picture
 //!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
@@ -68,6 +70,7 @@ use toml::Value;
 use crate::toml_value::{in_line, number, parse_colour, shown};
 use crate::{Error, Result, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::frame::Frame;
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -83,6 +86,8 @@ pub const MAX_IMAGE: u32 = 16384;
 pub struct Scene {
     /// Where the volume comes from.
     pub volume: VolumeSource,
+    /// What the axes of clips, eyes and light are.
+    pub frame: Frame,
     /// Where opacity and colour come from; see [`Scene::transfer`].
     pub transfer: TransferSource,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are closed and face outward.
@@ -207,7 +212,7 @@ pub struct Stereo {
 pub enum Viewpoint {
     /// Looking at the volume's centre from this side.
     Framing {
-        /// About +z, from -y.
+        /// About +z, from -y: of a patient 0 is from behind, 180 at the face.
         azimuth_deg: f32,
         /// Above the xy plane.
         elevation_deg: f32,
@@ -233,7 +238,8 @@ impl Default for Stereo {
 }
 
 impl Stereo {
-    /// The rig for a volume of this size in mm.
+    /// The rig for a volume of this size in mm along the frame's axes
+    /// ([`Turn::extent`](cao_model::frame::Turn::extent)).
     pub fn rig(&self, size_mm: [f64; 3]) -> StereoRig {
         let mut rig = match self.viewpoint {
             Viewpoint::Framing { azimuth_deg, elevation_deg, .. } => {
@@ -281,6 +287,7 @@ impl Scene {
     pub fn default_for(volume: VolumeSource) -> Self {
         Self {
             volume,
+            frame: Frame::default(),
             transfer: TransferSource::Preset("auto".into()),
             clips: Vec::new(),
             occlusion: OcclusionSettings::default(),
@@ -318,6 +325,7 @@ impl Scene {
         let step_mm = file.image.step_mm.map(|mm| mm as f32);
         Ok(Self {
             volume: volume(file.volume, base)?,
+            frame: file.frame.as_deref().map_or(Ok(Frame::default()), Frame::parse)?,
             transfer: file
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
@@ -346,6 +354,7 @@ impl Scene {
 #[serde(deny_unknown_fields)]
 struct SceneFile {
     volume: Value,
+    frame: Option<String>,
     transfer: Option<Value>,
     #[serde(default)]
     clip: Vec<ClipFile>,

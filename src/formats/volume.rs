@@ -4,7 +4,9 @@
 //! and raw data with a description beside it ([`read_raw`]). The content decides which reader is used, the file's
 //! extension only where a format has no signature.
 //!
-//! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header
+//! Where a file states how its grid lies in the patient, voxels come in canonical order ([`Volume::into_canonical`]), and
+//! [`write_nrrd`](crate::write_nrrd) gives files the stored one back. Stored values keep the file's type; a file's slope and
+//! intercept apply on access. What does not fit the header
 //! exactly (too short, too long, NaN, an unknown type) is refused with the file and the field named.
 
 use std::fs::File;
@@ -83,7 +85,8 @@ pub(crate) fn bad(path: &Path, field: &str, problem: impl Into<String>) -> Error
     Error::File { path: path.into(), field: field.into(), problem: problem.into() }
 }
 
-/// The last step of every reader: values that are no numbers are refused, everything else was checked before.
+/// The last step of every reader: values that are no numbers are refused, everything else was checked before; then voxels
+/// come into canonical order.
 pub(crate) fn assemble(
     path: &Path,
     dims: [usize; 3],
@@ -94,12 +97,12 @@ pub(crate) fn assemble(
     check_finite(dims, &values).map_err(|p| bad(path, "data", p))?;
     let Grid { spacing, origin, directions, space } = grid;
     let (slope, intercept) = scale;
-    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept };
+    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept, stored: None };
     if scale != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
         let problem = format!(
             "slope {slope} and intercept {intercept} lead beyond all numbers, expected finite values"
         );
         return Err(bad(path, "data", problem));
     }
-    Ok(volume)
+    volume.into_canonical().map_err(|error| bad(path, "data", error.to_string()))
 }

@@ -1,5 +1,6 @@
 //! A volume: values on a regular grid, and where it lies.
 
+pub use crate::order::{Layout, Stored};
 use crate::values::Values;
 use crate::{Error, Result};
 
@@ -34,6 +35,8 @@ pub struct Volume {
     pub slope: f64,
     /// See `slope`.
     pub intercept: f64,
+    /// The order of the voxels in their file, where it is another one; files that are written get it back.
+    pub stored: Option<Stored>,
 }
 
 impl Volume {
@@ -65,6 +68,7 @@ impl Volume {
             values,
             slope: 1.0,
             intercept: 0.0,
+            stored: None,
         })
     }
 

@@ -6,6 +6,7 @@ use cao_gpu as gpu;
 mod builtin;
 mod house;
 mod mesh;
+mod orders;
 mod scene;
 mod shaders;
 mod transfer;

@@ -1,8 +1,9 @@
-//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`wgsl`] for tests that
+//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`scan`] of files; [`wgsl`] for tests that
 //! bring kernels of their own.
 
 #![forbid(unsafe_code)]
 
+pub mod scan;
 pub mod wgsl;
 
 use cao::field::Field;

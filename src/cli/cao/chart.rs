@@ -113,7 +113,7 @@ fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };
-    let volume = args::open(&described.volume, name)?;
+    let (volume, turn) = described.frame.arrange(args::open(&described.volume, name)?)?;
     let transfer = match &args.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range())?,
         None => described.transfer(volume.range())?,
@@ -121,10 +121,10 @@ fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
     let resolved = described.occlusion.setup(volume.min_spacing())?.occlusion;
     let clips = match described.clips.is_empty() {
         true => vec![Scene::default_clip(&volume)],
-        false => described.clips,
+        false => turn.clips(&described.clips),
     };
     let radius_mm = args.radius_mm.or(radius).unwrap_or(resolved.radius_mm);
-    let rig = described.stereo.rig(volume.size_mm());
+    let rig = turn.rig(&described.stereo.rig(turn.extent(volume.size_mm())));
     Ok(Scene { name: name.into(), volume, state: State { clips, transfer, radius_mm }, rig })
 }
 
