@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{Error, Result};
-use cao_model::volume::{IDENTITY, Layout, Space, Volume};
+use cao_model::order::Layout;
+use cao_model::volume::{IDENTITY, Space, Volume};
 
 /// Writes one value a voxel of `like` as a NRRD file: 32-bit float, raw, little-endian, x fastest. The file has the order of
 /// voxels, the dimensions and the spacing of the one that `like` was read from, and its origin, directions and space if it

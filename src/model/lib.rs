@@ -11,7 +11,7 @@ pub mod look;
 pub mod mesh;
 pub mod methods;
 pub mod occlusion;
-mod order;
+pub mod order;
 pub mod settings;
 pub mod transfer;
 pub mod values;

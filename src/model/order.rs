@@ -5,19 +5,16 @@
 //! mirror image, which no rotation undoes. The 48 orders of one grid all lead to the same canonical order: which axis comes
 //! first, and which way it runs, is decided by where the axes point and not by how they are numbered.
 
-use crate::volume::{Space, Volume};
-use crate::{Error, Result};
-
 /// The order that voxels had in their file, where it is another one than in memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stored {
     /// The file's order from the volume's.
-    steps: Steps,
+    pub(crate) steps: Steps,
     /// Position of the first voxel of the file in mm, free of the rounding that a way there and back has.
-    origin: [f64; 3],
+    pub(crate) origin: [f64; 3],
 }
 
-/// Where voxels lie, without their values; fields as in [`Volume`].
+/// Where voxels lie, without their values; fields as in [`Volume`](crate::volume::Volume).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Layout {
     /// Voxels along x, y, z.
@@ -30,82 +27,11 @@ pub struct Layout {
     pub directions: [[f64; 3]; 3],
 }
 
-impl Volume {
-    /// The same volume with its voxels in canonical order: index axes run closest to +right, +anterior, +superior, and are
-    /// right-handed. As it is where no patient frame is stated.
-    ///
-    /// # Errors
-    /// [`Error::Config`] when there is no memory for the values once more.
-    pub fn into_canonical(self) -> Result<Self> {
-        if self.space == Space::Unknown || self.stored.is_some() {
-            return Ok(self);
-        }
-        let steps = Steps::nearest(&self.directions);
-        if steps == Steps::NONE {
-            return Ok(self);
-        }
-        let stored = Some(Stored { steps: steps.inverse(), origin: self.origin });
-        Ok(Self { stored, ..self.reordered(steps)? })
-    }
-
-    /// The same volume with its voxels in the order of its file.
-    ///
-    /// # Errors
-    /// [`Error::Config`] when there is no memory for the values once more.
-    pub fn into_stored(self) -> Result<Self> {
-        match self.stored {
-            None => Ok(self),
-            Some(Stored { steps, origin }) => Ok(Self { stored: None, origin, ..self.reordered(steps)? }),
-        }
-    }
-
-    /// How the voxels lie in the order of the file.
-    pub fn stored_layout(&self) -> Layout {
-        match self.stored {
-            None => self.layout(),
-            Some(Stored { steps, origin }) => Layout { origin, ..steps.layout(&self.layout()) },
-        }
-    }
-
-    /// For each voxel in the order of the file, x fastest, its place in memory.
-    pub fn stored_places(&self) -> impl Iterator<Item = usize> + use<> {
-        self.stored.map_or(Steps::NONE, |stored| stored.steps).places(self.dims)
-    }
-
-    /// Where the index axes of the file point, such as `LAS`: to the left, to anterior, to superior. `None` where no patient
-    /// frame is stated.
-    pub fn stored_axes(&self) -> Option<String> {
-        let steps = Steps::nearest(&self.stored_layout().directions).inverse();
-        let letter = |a: usize| if steps.reversed[a] { b"LPI" } else { b"RAS" }[steps.axes[a]];
-        (self.space == Space::Ras).then(|| [0, 1, 2].map(letter).map(char::from).iter().collect())
-    }
-
-    fn layout(&self) -> Layout {
-        let Self { dims, spacing, origin, directions, .. } = *self;
-        Layout { dims, spacing, origin, directions }
-    }
-
-    fn reordered(mut self, steps: Steps) -> Result<Self> {
-        let Layout { dims, spacing, origin, directions } = steps.layout(&self.layout());
-        if !self.values.gather(steps.places(self.dims)) {
-            return Err(Error::Config {
-                what: "values".into(),
-                problem: format!(
-                    "{} voxels of {} once more, to reorder them, are more memory than the system gives",
-                    self.len(),
-                    self.values.kind()
-                ),
-            });
-        }
-        Ok(Self { dims, spacing, origin, directions, ..self })
-    }
-}
-
 /// One order seen from another: along axis a runs the other's axis `axes[a]`, backwards where `reversed`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Steps {
-    axes: [usize; 3],
-    reversed: [bool; 3],
+pub(crate) struct Steps {
+    pub(crate) axes: [usize; 3],
+    pub(crate) reversed: [bool; 3],
 }
 
 /// Sums of cosines nearer than this count as equal, so that axes at 45° that were rounded differently are still sorted the
@@ -113,7 +39,7 @@ struct Steps {
 const TIE: f64 = 1e-4;
 
 impl Steps {
-    const NONE: Self = Self { axes: [0, 1, 2], reversed: [false; 3] };
+    pub(crate) const NONE: Self = Self { axes: [0, 1, 2], reversed: [false; 3] };
 
     const PERMUTATIONS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
@@ -122,7 +48,7 @@ impl Steps {
     ///
     /// The outcome is right-handed. The sums of the six permutations are 1 or more on average (each cosine is at least its
     /// square), so the largest is above 1, and the trace of a reflection is not.
-    fn nearest(directions: &[[f64; 3]; 3]) -> Self {
+    pub(crate) fn nearest(directions: &[[f64; 3]; 3]) -> Self {
         let cosine = |axes: [usize; 3], a: usize| directions[axes[a]][a];
         let sum = |axes: [usize; 3]| (0..3).map(|a| cosine(axes, a).abs()).sum::<f64>();
         let most = Self::PERMUTATIONS.into_iter().map(sum).fold(0.0, f64::max);
@@ -134,7 +60,7 @@ impl Steps {
             .unwrap_or(Self::NONE)
     }
 
-    fn inverse(self) -> Self {
+    pub(crate) fn inverse(self) -> Self {
         let mut inverse = Self::NONE;
         for a in 0..3 {
             inverse.axes[self.axes[a]] = a;
@@ -148,7 +74,7 @@ impl Steps {
         [0, 1, 2].map(|a| of[self.axes[a]].map(|d| if self.reversed[a] { 0.0 - d } else { d }))
     }
 
-    fn layout(self, of: &Layout) -> Layout {
+    pub(crate) fn layout(self, of: &Layout) -> Layout {
         let mut origin = of.origin;
         for axis in (0..3).filter(|a| self.reversed[*a]).map(|a| self.axes[a]) {
             let length = (of.dims[axis] as f64 - 1.0) * of.spacing[axis];
@@ -163,7 +89,7 @@ impl Steps {
     }
 
     /// For each voxel in this order, x fastest, its place in the other, which has `dims`.
-    fn places(self, dims: [usize; 3]) -> impl Iterator<Item = usize> {
+    pub(crate) fn places(self, dims: [usize; 3]) -> impl Iterator<Item = usize> {
         let strides = [1, dims[0], dims[0] * dims[1]];
         let along = move |a: usize| {
             let (n, stride) = (dims[self.axes[a]], strides[self.axes[a]]);

@@ -4,7 +4,8 @@ use crate::args::{Global, Info};
 use anyhow::Result;
 use cao_cli::output::Out;
 use cao_model::frame::Turn;
-use cao_model::volume::{Layout, Space, Volume};
+use cao_model::order::Layout;
+use cao_model::volume::{Space, Volume};
 use serde_json::json;
 use std::process::ExitCode;
 
