@@ -10,8 +10,7 @@
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
-//!     frame = "patient"                # x right, y anterior, z superior where the volume's file states them, else its index
-//!                                      # axes; "index": always those, as stored
+//!     frame = "patient"                # right, anterior, superior where the file states them, else index axes; "index": as stored
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
 //!
 //!     [[clip]]                         # none, one, or up to eight

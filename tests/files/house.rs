@@ -192,7 +192,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/clip.rs", &["error", "mesh"]),
     ("src/model/order.rs", &[]),
     ("src/model/volume.rs", &["error", "order", "values"]),
-    ("src/model/frame.rs", &["clip", "error", "look", "view", "volume"]),
+    ("src/model/frame.rs", &["clip", "error", "look", "values", "view", "volume"]),
     ("src/model/builtin.rs", &["error", "values", "volume"]),
     ("src/formats/error.rs", &[]),
     ("src/formats/grid.rs", &[]),
