@@ -111,16 +111,25 @@ fn axes_run_along_those_of_the_patient_that_they_are_nearest_to() {
 #[test]
 fn a_qform_is_read_in_every_order_and_leaves_no_rotation_where_axes_are_straight() {
     let folder = tempfile::tempdir().unwrap();
-    let truth = scan(DQuat::IDENTITY);
-    for order in orders() {
-        let volume = read_as(folder.path(), "a.nii", &truth.in_order(order).nifti_by_qform());
-        assert_eq!(
-            (&place(&volume).values, volume.dims, volume.spacing),
-            (&truth.values, truth.dims, truth.spacing)
-        );
-        assert!(DVec3::from(volume.origin).distance(truth.origin.into()) < POSITION_MM, "{order:?}");
-        assert_eq!(Turn::into_axes_of(&volume), Turn::NONE, "{order:?}: {:?}", volume.directions);
+    for (turned, rotation) in rotations() {
+        let truth = scan(rotation);
+        // Quaternions of f32 are rounded differently in every order, which must not choose between axes at 45°.
+        let first = read_as(folder.path(), "a.nrrd", &truth.nrrd("RAS"));
+        for order in orders() {
+            let volume = read_as(folder.path(), "a.nii", &truth.in_order(order).nifti_by_qform());
+            let what = format!("{turned}, {order:?}");
+            assert_eq!((&volume.values, volume.dims), (&first.values, first.dims), "{what}");
+            assert_eq!(volume.spacing, truth_spacing(&first), "{what}");
+            assert!(DVec3::from(volume.origin).distance(first.origin.into()) < POSITION_MM, "{what}");
+            let straight = Turn::into_axes_of(&volume) == Turn::NONE;
+            assert_eq!(straight, turned == "straight", "{what}: {:?}", volume.directions);
+        }
     }
+}
+
+/// Spacings without what the lengths of oblique vectors add to them.
+fn truth_spacing(volume: &Volume) -> [f64; 3] {
+    volume.spacing.map(|s| f64::from(s as f32))
 }
 
 #[test]
