@@ -79,5 +79,6 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn times(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] * b[i])
+    // The sum turns -0 into 0, which is what people read.
+    std::array::from_fn(|i| a[i] * b[i] + 0.0)
 }

@@ -1,5 +1,5 @@
-//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`scan`] of files; [`wgsl`] for tests that
-//! bring kernels of their own.
+//! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes; [`scan`]s as files;
+//! [`wgsl`] for tests that bring kernels of their own.
 
 #![forbid(unsafe_code)]
 
