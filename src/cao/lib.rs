@@ -31,9 +31,12 @@
 //! * **Index space**: voxel (0, 0, 0) is the first in memory; its *centre* is at index position (0, 0, 0), so the volume
 //!   reaches from -0.5 to `dims` - 0.5. It is the corner with the smallest world coordinates.
 //! * **World frame**: millimetres, origin at the volume's centre, axes along the volume's index axes, right-handed:
-//!   `p = (i - (dims - 1)/2) · spacing`. Clips, eyes and light live in it. Origin and directions of a file are carried to
-//!   output files and change nothing else; where they make the axes left-handed, pictures are mirror images, and
-//!   `cao info` says so.
+//!   `p = (i - (dims - 1)/2) · spacing`. Clips, eyes and light live in it.
+//! * **Patient frame**: right, anterior, superior, the same origin. `cao-formats` reads voxels in the order whose index axes
+//!   are nearest to these, so that no picture is a mirror image; what is left where a grid is oblique is a rotation,
+//!   [`Turn::into_axes_of`] the volume, for the caller to apply to clips, eyes and light. A renderer knows nothing of it, and
+//!   takes a volume with left-handed axes as it is. Read-backs have the volume's order; `cao_formats::write_nrrd` writes the
+//!   file's.
 //! * **Lengths** in mm, **angles** in degrees, rotations about the fixed axes x, then y, then z
 //!   (`p = T + Rz·Ry·Rx·(S·p_local)`); column vectors, matrices as [`glam`] has them.
 //! * **Eyes** look along -z of their frame, +y is up, +x to the right, as in OpenXR; the field of view is four signed
@@ -76,6 +79,7 @@ pub use cao_gpu as gpu;
 pub use cao_model as model;
 
 pub use cao_model::clip::{Clip, Mode, Pose, Shape};
+pub use cao_model::frame::{Frame, Turn};
 pub use cao_model::look::Look;
 pub use cao_model::mesh::TriangleMesh;
 pub use cao_model::methods::{METHODS, Method};

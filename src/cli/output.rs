@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use cao::ambient::Categories;
 use cao_formats::printable;
 use cao_gpu::{Gpu, OpenOptions, Timings};
+use cao_model::order::Layout;
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -53,16 +54,17 @@ impl Out {
         self.json(json!({ "device": info.name, "driver": info.driver }));
     }
 
-    /// A volume's header.
+    /// A volume's header, axes as its file has them.
     pub fn volume(&mut self, name: impl AsRef<OsStr>, volume: &Volume) {
-        let ([x, y, z], [sx, sy, sz]) = (volume.dims, volume.spacing);
+        let Layout { dims, spacing, .. } = volume.stored_layout();
+        let ([x, y, z], [sx, sy, sz]) = (dims, spacing);
         self.line(format!(
             "volume    {}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
             printable(&name),
             volume.values.kind()
         ));
         self.json(json!({
-            "volume": name.as_ref().to_string_lossy(), "dims": volume.dims, "spacing_mm": volume.spacing,
+            "volume": name.as_ref().to_string_lossy(), "dims": dims, "spacing_mm": spacing,
             "type": volume.values.kind()
         }));
     }

@@ -2,9 +2,9 @@
 
 use cao_model::volume::{IDENTITY, Space};
 
-/// Cosine between two index axes beyond which a grid counts as sheared (1°): distances are taken along the axes, as
-/// if they were at right angles.
-const MAX_AXIS_COSINE: f64 = 0.0175;
+/// Cosine between two index axes beyond which a grid counts as sheared (0.1°, a voxel in 570): distances are taken along the
+/// axes, as if they were at right angles. Headers with three digits stay below it.
+const MAX_AXIS_COSINE: f64 = 0.001_75;
 
 /// Where the voxels of a file are.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +66,8 @@ pub(crate) fn axes(vectors: [[f64; 3]; 3]) -> Result<([f64; 3], [[f64; 3]; 3]), 
         if cosine.abs() > MAX_AXIS_COSINE {
             let degrees = cosine.clamp(-1.0, 1.0).acos().to_degrees();
             return Err(format!(
-                "axes {a} and {b} meet at {degrees:.1}°, expected 90° (a sheared grid has to be resampled first)"
+                "axes {a} and {b} meet at {degrees:.1}°, expected 90° (a sheared grid, as of a tilted gantry, has to be \
+                 resampled first)"
             ));
         }
     }
@@ -78,5 +79,6 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 fn times(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] * b[i])
+    // The sum turns -0 into 0, which is what people read.
+    std::array::from_fn(|i| a[i] * b[i] + 0.0)
 }

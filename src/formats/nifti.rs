@@ -1,7 +1,8 @@
 //! NIfTI-1 and NIfTI-2, in one file (`.nii`, `.nii.gz`) or two (`.hdr` and `.img`):
 //! <https://nifti.nimh.nih.gov/nifti-1>, <https://nifti.nimh.nih.gov/nifti-2>.
 //!
-//! Spacing is `pixdim`; origin and directions are those of the sform, else of the qform, both in RAS.
+//! Origin and directions are those of the sform, else of the qform, both in RAS. Spacing is `pixdim`, or the sform's where that
+//! says something else. A sheared sform is refused also where there is a qform, which cannot have a shear and hides it.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -217,33 +218,38 @@ impl<'a> Header<'a> {
         check_spacing(grid.spacing.map(|s| s * unit)).map_err(|p| bad(path, "pixdim", p))?;
         let (qform, sform) =
             if self.second { (self.i32(344), self.i32(348)) } else { (self.i16(252), self.i16(254)) };
-        let mut grid = match (sform > 0, qform > 0) {
-            (false, false) => grid,
+        // Some writers announce an sform and leave its place empty.
+        let blank = (0..3).all(|i| self.srow(i) == [0.0; 3]);
+        let mut grid = match (sform > 0 && !(blank && qform > 0), qform > 0) {
+            (true, _) => self.sform(grid)?,
             (false, true) => self.qform(grid)?,
-            (true, false) => self.sform(grid)?,
-            // A registration may shear the sform; the scanner's grid is then the other one.
-            (true, true) => self.sform(grid.clone()).or_else(|_| self.qform(grid))?,
+            (false, false) => grid,
         };
         grid = grid.scaled(unit);
+        check_spacing(grid.spacing).map_err(|p| bad(path, "srow", p))?;
         if grid.origin.iter().any(|x| !x.is_finite()) {
             return Err(bad(path, "qoffset", format!("{:?}, expected a finite position", grid.origin)));
         }
         Ok(grid)
     }
 
+    /// Column `i` of the sform: the vector of an index axis, or the origin.
+    fn srow(&self, i: usize) -> [f64; 3] {
+        [(280, 400), (296, 432), (312, 464)].map(|offsets| self.real(offsets, i))
+    }
+
     fn sform(&self, grid: Grid) -> Result<Grid> {
-        let rows = [(280, 400), (296, 432), (312, 464)];
-        let column = |i: usize| rows.map(|offsets| self.real(offsets, i));
-        let (_, directions) =
-            grid::axes([column(0), column(1), column(2)]).map_err(|p| bad(self.path, "srow", p))?;
-        if column(3).iter().any(|x| !x.is_finite()) {
-            return Err(bad(
-                self.path,
-                "srow",
-                format!("origin {:?}, expected a finite position", column(3)),
-            ));
+        let (lengths, directions) =
+            grid::axes([0, 1, 2].map(|i| self.srow(i))).map_err(|p| bad(self.path, "srow", p))?;
+        let origin = self.srow(3);
+        if origin.iter().any(|x| !x.is_finite()) {
+            let problem = format!("origin {origin:?}, expected a finite position");
+            return Err(bad(self.path, "srow", problem));
         }
-        Ok(Grid { origin: column(3), directions, space: Space::Ras, ..grid })
+        // Beyond rounding, points of the patient are those of the sform: a registration may have scaled it.
+        let same = |a: usize| (lengths[a] - grid.spacing[a]).abs() <= 1e-3 * grid.spacing[a];
+        let spacing = if (0..3).all(same) { grid.spacing } else { lengths };
+        Ok(Grid { spacing, origin, directions, space: Space::Ras })
     }
 
     /// Method 2 of the format: a unit quaternion of which b, c, d are stored.
@@ -253,11 +259,11 @@ impl<'a> Header<'a> {
         if !square.is_finite() {
             return Err(bad(self.path, "quatern", format!("({b}, {c}, {d}), expected finite numbers")));
         }
-        // Rounding may leave the three a little too long.
-        let a = (1.0 - square).max(0.0).sqrt();
-        if square > 1.0 {
+        let mut a = (1.0 - square).max(0.0).sqrt();
+        // Where rounding of the three is all that is left of a, or makes them too long, a is 0, as in the format's own library.
+        if 1.0 - square < 1e-7 {
             let length = square.sqrt();
-            (b, c, d) = (b / length, c / length, d / length);
+            (a, b, c, d) = (0.0, b / length, c / length, d / length);
         }
         // pixdim[0] is the sign of the third axis, 0 meaning +1.
         let sign = if self.real((76, 104), 0) < 0.0 { -1.0 } else { 1.0 };

@@ -1,8 +1,8 @@
 //! The scene file: everything that one picture needs, in TOML.
 //!
 //! Paths are relative to the scene file. Every key but `volume` may be left out. Unknown keys and impossible values are
-//! refused by name. Lengths are millimetres in the volume's frame (origin at its centre, axes as its index axes),
-//! angles degrees, colours sRGB.
+//! refused by name. Lengths are millimetres, angles degrees, colours sRGB. Clips with their meshes, eyes and light share one
+//! frame, whose origin is the volume's centre and whose axes `frame` chooses ([`Frame`]).
 //!
 //! ```
 //! let scene = cao_formats::Scene::from_toml(
@@ -11,6 +11,7 @@
 //!     ## volume = { file = "fmri.nii.gz", frame_index = 7, nan = "transparent" }  # one of a series, from 0; or a value for NaN
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
+//!     frame = "patient"                # right, anterior, superior where the file states them, else index axes; "index": as stored
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
 //!
 //!     [[clip]]                         # none, one, or up to eight
@@ -30,7 +31,7 @@
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
-//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y
+//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y; 180: a patient's face
 //!     elevation_deg = 25
 //!     distance_mm = 400                # of the eyes from the centre; default: it fills the picture
 //!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
@@ -71,6 +72,7 @@ use crate::toml_value::{in_line, number, parse_colour, shown};
 use crate::{Error, Result, file, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::error::{quoted, shown_path};
+use cao_model::frame::Frame;
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -88,6 +90,8 @@ pub struct Scene {
     pub volume: VolumeSource,
     /// How to read it where the file leaves a choice.
     pub reading: Reading,
+    /// What the axes of clips, eyes and light are.
+    pub frame: Frame,
     /// Where opacity and colour come from; see [`Scene::transfer`].
     pub transfer: TransferSource,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are solids.
@@ -216,7 +220,7 @@ pub struct Stereo {
 pub enum Viewpoint {
     /// Looking at the volume's centre from this side.
     Framing {
-        /// About +z, from -y.
+        /// About +z, from -y: of a patient 0 is from behind, 180 at the face.
         azimuth_deg: f32,
         /// Above the xy plane.
         elevation_deg: f32,
@@ -242,7 +246,8 @@ impl Default for Stereo {
 }
 
 impl Stereo {
-    /// The rig for a volume of this size in mm.
+    /// The rig for a volume of this size in mm along the frame's axes
+    /// ([`Turn::extent`](cao_model::frame::Turn::extent)).
     pub fn rig(&self, size_mm: [f64; 3]) -> StereoRig {
         let mut rig = match self.viewpoint {
             Viewpoint::Framing { azimuth_deg, elevation_deg, .. } => {
@@ -291,6 +296,7 @@ impl Scene {
         Self {
             volume,
             reading: Reading::default(),
+            frame: Frame::default(),
             transfer: TransferSource::Preset("auto".into()),
             clips: Vec::new(),
             occlusion: OcclusionSettings::default(),
@@ -329,6 +335,7 @@ impl Scene {
         Ok(Self {
             volume,
             reading,
+            frame: file.frame.as_deref().map_or(Ok(Frame::default()), Frame::parse)?,
             transfer: file
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
@@ -357,6 +364,7 @@ impl Scene {
 #[serde(deny_unknown_fields)]
 struct SceneFile {
     volume: Value,
+    frame: Option<String>,
     transfer: Option<Value>,
     #[serde(default)]
     clip: Vec<ClipFile>,

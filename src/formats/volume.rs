@@ -4,9 +4,10 @@
 //! and raw data with a description beside it ([`read_raw`](crate::read_raw)). The content decides which reader is used, the file's
 //! extension only where a format has no signature.
 //!
-//! Stored values keep the file's type; a file's slope and intercept apply on access. What does not fit the header
-//! (too short, NaN, an unknown type) is refused with the file and the field named; what follows the data is ignored with a
-//! warning. What a file leaves open, the caller says in a [`Reading`].
+//! Where a file states how its grid lies in the patient, voxels come in canonical order ([`Volume::into_canonical`]), and
+//! [`write_nrrd`](crate::write_nrrd) gives files the stored one back. Stored values keep the file's type; a file's slope and
+//! intercept apply on access. What does not fit the header (too short, NaN, an unknown type) is refused with the file and the
+//! field named; what follows the data is ignored with a warning. What a file leaves open, the caller says in a [`Reading`].
 
 use std::io::Read;
 use std::path::Path;
@@ -108,7 +109,8 @@ pub(crate) struct Found {
     pub(crate) warnings: Vec<String>,
 }
 
-/// The last step of every reader: what stands for values that are no numbers; everything else was checked before.
+/// The last step of every reader: what stands for values that are no numbers, everything else was checked before; then voxels
+/// come into canonical order.
 pub(crate) fn assemble(path: &Path, found: Found, reading: &Reading) -> Result<Opened> {
     let Found { dims, grid, mut values, scale: (slope, intercept), warnings } = found;
     match reading.no_numbers {
@@ -125,12 +127,13 @@ pub(crate) fn assemble(path: &Path, found: Found, reading: &Reading) -> Result<O
         }
     }
     let Grid { spacing, origin, directions, space } = grid;
-    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept };
+    let volume = Volume { dims, spacing, origin, directions, space, values, slope, intercept, stored: None };
     if (slope, intercept) != (1.0, 0.0) && !(volume.range().0.is_finite() && volume.range().1.is_finite()) {
         let problem = format!(
             "slope {slope} and intercept {intercept} lead beyond all numbers, expected finite values"
         );
         return Err(bad(path, "data", problem));
     }
+    let volume = volume.into_canonical().map_err(|error| bad(path, "data", error.to_string()))?;
     Ok(Opened { volume, warnings })
 }

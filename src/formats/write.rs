@@ -1,14 +1,17 @@
 //! Volumes as NRRD.
 
+use std::io;
 use std::path::Path;
 
 use crate::error::printable;
 use crate::outputs::Outputs;
 use crate::{Error, Result};
+use cao_model::order::Layout;
 use cao_model::volume::{IDENTITY, Space, Volume};
 
-/// Writes one value a voxel of `like` as a NRRD file: 32-bit float, raw, little-endian, x fastest, with the spacing
-/// of `like`, and with its origin, directions and space if it has any. `content` becomes the field of that name.
+/// Writes one value a voxel of `like` as a NRRD file: 32-bit float, raw, little-endian, x fastest. The file has the order of
+/// voxels, the dimensions and the spacing of the one that `like` was read from, and its origin, directions and space if it
+/// has any, so that it lies on that file in every program. `content` becomes the field of that name.
 ///
 /// Errors: [`cao_model::Error::Config`] when `data` has not `like.len()` values; [`Error::Io`] as [`Outputs::write`].
 pub fn write_nrrd(path: &Path, like: &Volume, data: &[f32], content: &str) -> Result<()> {
@@ -29,20 +32,23 @@ impl Outputs {
         }
         self.write(path, |out| {
             out.write_all(header(like, content).as_bytes())?;
-            const PIECE: usize = 1 << 14;
-            let mut bytes = Vec::with_capacity(PIECE * size_of::<f32>());
-            for piece in data.chunks(PIECE) {
-                bytes.clear();
-                bytes.extend(piece.iter().flat_map(|v| v.to_le_bytes()));
-                out.write_all(&bytes)?;
-            }
-            Ok(())
+            const PIECE: usize = 1 << 16;
+            let mut bytes = Vec::with_capacity(PIECE);
+            like.stored_places().try_for_each(|place| {
+                bytes.extend(data[place].to_le_bytes());
+                if bytes.len() == PIECE {
+                    out.write_all(&bytes)?;
+                    bytes.clear();
+                }
+                Ok::<_, io::Error>(())
+            })?;
+            out.write_all(&bytes)
         })
     }
 }
 
 fn header(like: &Volume, content: &str) -> String {
-    let [x, y, z] = like.dims;
+    let Layout { dims: [x, y, z], spacing, origin, directions } = like.stored_layout();
     let mut text = String::from("NRRD0004\n");
     // A line end would end the field, and an empty line the header.
     let content = content.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -50,18 +56,18 @@ fn header(like: &Volume, content: &str) -> String {
         text += &format!("content: {content}\n");
     }
     text += &format!("type: float\ndimension: 3\nsizes: {x} {y} {z}\n");
-    let placed = like.space != Space::Unknown || like.origin != [0.0; 3] || like.directions != IDENTITY;
+    let placed = like.space != Space::Unknown || origin != [0.0; 3] || directions != IDENTITY;
     if placed {
         // `space` must stand before the fields that use it.
         text += match like.space {
             Space::Ras => "space: right-anterior-superior\n",
             Space::Unknown => "space dimension: 3\n",
         };
-        let axis = |a: usize| vector(like.directions[a].map(|d| d * like.spacing[a]));
+        let axis = |a: usize| vector(directions[a].map(|d| d * spacing[a]));
         text += &format!("space directions: {} {} {}\n", axis(0), axis(1), axis(2));
-        text += &format!("space origin: {}\n", vector(like.origin));
+        text += &format!("space origin: {}\n", vector(origin));
     } else {
-        let [x, y, z] = like.spacing;
+        let [x, y, z] = spacing;
         text += &format!("spacings: {x} {y} {z}\n");
     }
     text + "kinds: domain domain domain\nendian: little\nencoding: raw\n\n"

@@ -6,10 +6,12 @@
 pub mod builtin;
 pub mod clip;
 pub mod error;
+pub mod frame;
 pub mod look;
 pub mod mesh;
 pub mod methods;
 pub mod occlusion;
+pub mod order;
 pub mod settings;
 pub mod transfer;
 pub mod values;

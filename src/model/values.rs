@@ -123,6 +123,11 @@ impl Values {
         each!(self, v => append(v, from, count, endian))
     }
 
+    /// Replaces the values by those at `places`; `false`, and nothing done, when the system has not the memory.
+    pub(crate) fn gather(&mut self, places: impl Iterator<Item = usize>) -> bool {
+        each!(self, v => gather(v, places))
+    }
+
     /// Appends one value written as text; `false` when it is not a number of this type.
     pub fn append_text(&mut self, text: &str) -> bool {
         each!(self, v => text.parse().map(|x| v.push(x)).is_ok())
@@ -288,6 +293,14 @@ fn room<T>(count: usize) -> Option<Vec<T>> {
     let mut values = Vec::new();
     values.try_reserve_exact(count).ok()?;
     Some(values)
+}
+
+fn gather<T: Sample>(values: &mut Vec<T>, places: impl Iterator<Item = usize>) -> bool {
+    let Some(mut gathered) = room(values.len()) else { return false };
+    // From within, the three loops of the places are three loops.
+    places.for_each(|place| gathered.push(values[place]));
+    *values = gathered;
+    true
 }
 
 /// Grows by a piece at a time, so that a header which promises too much costs no more memory than the data that came.

@@ -1,5 +1,6 @@
 //! A volume: values on a regular grid, and where it lies.
 
+use crate::order::{Layout, Steps, Stored};
 use crate::transfer::TransferFunction;
 use crate::values::Values;
 use crate::{Error, Result};
@@ -15,8 +16,9 @@ pub enum Space {
 
 /// A scalar field on a regular grid.
 ///
-/// Distances everywhere in the crate come from `spacing` alone; `origin`, `directions` and `space` are carried from
-/// input to output files and nothing else.
+/// Plain index space: distances everywhere come from `spacing` alone, and a renderer draws the index axes as they are.
+/// `origin`, `directions` and `space` say where the grid lies, for files that are written, for [`Volume::into_canonical`] and
+/// for the rotation that is left to the patient ([`Turn`](crate::frame::Turn)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Volume {
     /// Voxels along x, y, z; x is fastest in memory.
@@ -35,6 +37,8 @@ pub struct Volume {
     pub slope: f64,
     /// See `slope`.
     pub intercept: f64,
+    /// The order of the voxels in their file, where it is another one; files that are written get it back.
+    pub stored: Option<Stored>,
 }
 
 impl Volume {
@@ -52,6 +56,7 @@ impl Volume {
             values,
             slope: 1.0,
             intercept: 0.0,
+            stored: None,
         };
         volume.check()?;
         Ok(volume)
@@ -141,6 +146,75 @@ impl Volume {
     /// the centre of the first voxel.
     pub fn to_world(&self, index: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|a| (index[a] - (self.dims[a] as f64 - 1.0) / 2.0) * self.spacing[a])
+    }
+
+    /// The same volume with its voxels in canonical order: index axes run closest to +right, +anterior, +superior, and are
+    /// right-handed. As it is where no patient frame is stated.
+    ///
+    /// # Errors
+    /// [`Error::Config`] when there is no memory for the values once more.
+    pub fn into_canonical(self) -> Result<Self> {
+        if self.space == Space::Unknown || self.stored.is_some() {
+            return Ok(self);
+        }
+        let steps = Steps::nearest(&self.directions);
+        if steps == Steps::NONE {
+            return Ok(self);
+        }
+        let stored = Some(Stored { steps: steps.inverse(), origin: self.origin });
+        Ok(Self { stored, ..self.reordered(steps)? })
+    }
+
+    /// The same volume with its voxels in the order of its file.
+    ///
+    /// # Errors
+    /// [`Error::Config`] when there is no memory for the values once more.
+    pub fn into_stored(self) -> Result<Self> {
+        match self.stored {
+            None => Ok(self),
+            Some(Stored { steps, origin }) => Ok(Self { stored: None, origin, ..self.reordered(steps)? }),
+        }
+    }
+
+    /// How the voxels lie in the order of the file.
+    pub fn stored_layout(&self) -> Layout {
+        match self.stored {
+            None => self.layout(),
+            Some(Stored { steps, origin }) => Layout { origin, ..steps.layout(&self.layout()) },
+        }
+    }
+
+    /// For each voxel in the order of the file, x fastest, its place in memory.
+    pub fn stored_places(&self) -> impl Iterator<Item = usize> + use<> {
+        self.stored.map_or(Steps::NONE, |stored| stored.steps).places(self.dims)
+    }
+
+    /// Where the index axes of the file point, such as `LAS`: to the left, to anterior, to superior. `None` where no patient
+    /// frame is stated.
+    pub fn stored_axes(&self) -> Option<String> {
+        let steps = Steps::nearest(&self.stored_layout().directions).inverse();
+        let letter = |a: usize| if steps.reversed[a] { b"LPI" } else { b"RAS" }[steps.axes[a]];
+        (self.space == Space::Ras).then(|| [0, 1, 2].map(letter).map(char::from).iter().collect())
+    }
+
+    fn layout(&self) -> Layout {
+        let Self { dims, spacing, origin, directions, .. } = *self;
+        Layout { dims, spacing, origin, directions }
+    }
+
+    fn reordered(mut self, steps: Steps) -> Result<Self> {
+        let Layout { dims, spacing, origin, directions } = steps.layout(&self.layout());
+        if !self.values.gather(steps.places(self.dims)) {
+            return Err(Error::Config {
+                what: "values".into(),
+                problem: format!(
+                    "{} voxels of {} once more, to reorder them, are more memory than the system gives",
+                    self.len(),
+                    self.values.kind()
+                ),
+            });
+        }
+        Ok(Self { dims, spacing, origin, directions, ..self })
     }
 }
 

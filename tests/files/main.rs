@@ -8,6 +8,7 @@ mod fuzz;
 mod hostile;
 mod house;
 mod mesh;
+mod orders;
 mod outputs;
 mod readings;
 mod scene;

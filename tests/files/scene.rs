@@ -5,6 +5,7 @@ use std::path::Path;
 use cao_formats::Error;
 use cao_formats::scene::{Scene, TransferSource, Viewpoint, VolumeSource};
 use cao_model::clip::{Mode, Shape};
+use cao_model::frame::Frame;
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Quadrature, RaySet};
@@ -49,6 +50,12 @@ fn a_volume_is_enough() {
             }
         }
     }
+}
+
+#[test]
+fn a_scene_says_what_its_axes_are() {
+    let frames = ["", "frame = \"patient\"", "frame = \"index\""].map(|text| with(text).frame);
+    assert_eq!(frames, [Frame::Patient, Frame::Patient, Frame::Index]);
 }
 
 /// What a scene leaves open follows from what it says: a rule of the paper asks for rays, and these for the paper's set.
@@ -239,6 +246,7 @@ fn unknown_keys_are_refused_by_name_and_line() {
 fn impossible_values_are_refused_by_name() {
     let nine = "[[clip]]\nshape = \"box\"\n".repeat(9);
     for (text, expected) in [
+        ("frame = \"world\"", "frame: \"world\"; expected patient or index"),
         ("transfer = 3", "transfer: 3: expected a preset, a file, or a table"),
         ("transfer = \"ct-bones\"", "transfer: there is no file"),
         (

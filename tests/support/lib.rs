@@ -1,10 +1,11 @@
 //! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes ([`meshes`] of several
-//! parts too); [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
+//! parts too), [`scan`]s as files; [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
 
 #![deny(unsafe_code)]
 
 pub mod fuzz;
 pub mod meshes;
+pub mod scan;
 pub mod wgsl;
 
 use cao::field::Field;

@@ -7,6 +7,7 @@ use cao_formats::printable;
 use cao_measure::stability::Trial;
 use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
+use cao_model::frame::Frame;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
@@ -36,8 +37,9 @@ More in `cao render --help` and so on.
 Volumes: NRRD, NIfTI, MetaImage, raw values with --dims and --type, and
 built-in ones, named like files: builtin:NAME:SIZE, with NAME one of
 engine, fruit, skeleton, empty, uniform, half-space, voxel, sheets.
-Lengths are millimetres, angles degrees, axes those of the volume,
-with the origin at its centre.
+Lengths are millimetres, angles degrees. The origin is the volume's centre;
+x, y, z are the patient's right, anterior, superior where a file states them,
+else the volume's index axes.
 
 Exit codes: 0 done, 1 failed (verify: something differs), 2 wrong usage.";
 
@@ -169,7 +171,11 @@ pub struct Render {
     /// Pixels of one eye [default: 1024x1024]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
-    /// Look from this side: degrees about +z, from -y [default: 30]
+    /// Axes of clips, eyes and light. patient: right, anterior, superior where the file states them, else the index axes; index:
+    /// the index axes as stored [default: the scene's, patient]
+    #[arg(long, value_name = "patient|index", value_parser = |s: &str| Frame::parse(s))]
+    pub frame: Option<Frame>,
+    /// Look from this side: degrees about +z, from -y; a patient's face is at 180 [default: 30]
     #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
     pub azimuth: Option<f32>,
     /// Look from this height: -90 to 90 degrees above the xy plane [default: 25]
@@ -201,9 +207,13 @@ pub struct Render {
 pub struct Occlusion {
     /// Volume file or builtin:NAME:SIZE
     pub input: OsString,
-    /// Ambient volume (NRRD of f32, x fastest, the input's spacing)
+    /// Ambient volume (NRRD of f32 on the input's grid, in its order)
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Axes of clips. patient: right, anterior, superior where the file states them, else the index axes; index:
+    /// the index axes as stored [default: patient]
+    #[arg(long, value_name = "patient|index", value_parser = |s: &str| Frame::parse(s))]
+    pub frame: Option<Frame>,
     /// Also write the clipped opacity (NRRD of f32)
     #[arg(long, value_name = "FILE")]
     pub opacity_out: Option<PathBuf>,

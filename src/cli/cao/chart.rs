@@ -125,7 +125,8 @@ fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };
-    let mut volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
+    let volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
+    let (mut volume, turn) = described.frame.arrange(volume)?;
     let transfer = match &args.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range()),
         None => described.transfer(volume.range()),
@@ -134,10 +135,10 @@ fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
     let resolved = described.occlusion.setup(volume.min_spacing())?.occlusion;
     let clips = match described.clips.is_empty() {
         true => vec![Scene::default_clip(&volume)],
-        false => described.clips,
+        false => turn.clips(&described.clips),
     };
     let radius_mm = args.radius_mm.or(radius).unwrap_or(resolved.radius_mm);
-    let rig = described.stereo.rig(volume.size_mm());
+    let rig = turn.rig(&described.stereo.rig(turn.extent(volume.size_mm())));
     Ok(Scene { name: printable(name), volume, state: State { clips, transfer, radius_mm }, rig })
 }
 

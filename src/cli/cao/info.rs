@@ -3,6 +3,8 @@
 use crate::args::{Global, Info};
 use anyhow::Result;
 use cao_cli::output::Out;
+use cao_model::frame::Turn;
+use cao_model::order::Layout;
 use cao_model::volume::{Space, Volume};
 use serde_json::json;
 use std::process::ExitCode;
@@ -14,17 +16,27 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
     let volume = args.raw.open(&args.input)?;
     let mut out = Out::new(global);
     out.volume(&args.input, &volume);
-    let [x, y, z] = volume.size_mm();
+    let Layout { dims, spacing, origin, directions } = volume.stored_layout();
+    let [x, y, z] = [0, 1, 2].map(|a| dims[a] as f64 * spacing[a]);
     let (low, high) = volume.range();
     let space = match volume.space {
         Space::Ras => "patient (right, anterior, superior)",
         Space::Unknown => "not said",
     };
     out.line(format!("size      {x} x {y} x {z} mm"));
-    out.line(format!("origin    {:?} mm, space {space}", volume.origin));
-    out.line(format!("axes      {:?}", volume.directions));
-    if left_handed(&volume) {
-        out.line("          left-handed: pictures of this volume are mirror images");
+    out.line(format!("origin    {origin:?} mm, space {space}"));
+    out.line(format!("axes      {directions:?}"));
+    let oblique = Turn::into_axes_of(&volume).degrees();
+    let stored_order = volume.stored_axes();
+    match &stored_order {
+        None => out.line("order     of the index axes; no patient frame is stated, and none is drawn"),
+        Some(order) => {
+            let hand = if left_handed(directions) { "left" } else { "right" };
+            out.line(format!(
+                "order     {order} as stored, {hand}-handed; drawn as RAS, oblique by {oblique:.2} degrees"
+            ));
+            out.line(format!("centre    {:?} mm, the origin of clips and eyes", centre(&volume)));
+        }
     }
     out.line(format!("rescale   stored * {} + {}", volume.slope, volume.intercept));
     out.line(format!("values    {low} ... {high}"));
@@ -42,10 +54,14 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
         out.line(format!("  {from:>12.2} {share:>7.3} % {bar}"));
     }
     out.json(json!({
-        "size_mm": volume.size_mm(),
-        "origin_mm": volume.origin,
-        "directions": volume.directions,
-        "left_handed": left_handed(&volume),
+        "size_mm": [x, y, z],
+        "origin_mm": origin,
+        "directions": directions,
+        "left_handed": stored_order.is_some() && left_handed(directions),
+        "stored_order": stored_order,
+        "drawn_order": stored_order.as_ref().map(|_| "RAS"),
+        "oblique_deg": oblique,
+        "centre_mm": centre(&volume),
         "slope": volume.slope,
         "intercept": volume.intercept,
         "smallest": low,
@@ -57,9 +73,14 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn left_handed(volume: &Volume) -> bool {
-    let [a, b, c] = volume.directions.map(glam::DVec3::from_array);
-    volume.space == Space::Ras && a.cross(b).dot(c) < 0.0
+fn left_handed(directions: [[f64; 3]; 3]) -> bool {
+    glam::DMat3::from_cols_array_2d(&directions).determinant() < 0.0
+}
+
+/// Position of the volume's centre in mm.
+fn centre(volume: &Volume) -> [f64; 3] {
+    let half = |a: usize| 0.5 * (volume.dims[a] as f64 - 1.0) * volume.spacing[a];
+    [0, 1, 2].map(|i| (0..3).fold(volume.origin[i], |sum, a| sum + half(a) * volume.directions[a][i]))
 }
 
 fn histogram(volume: &Volume, low: f64, high: f64) -> Vec<u64> {

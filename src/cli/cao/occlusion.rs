@@ -17,7 +17,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut progress = Progress::default();
     let clips = args::clips(matches)?;
     progress.stage("reading");
-    let mut volume = args.raw.open(&args.input)?;
+    let (mut volume, turn) = args.frame.unwrap_or_default().arrange(args.raw.open(&args.input)?)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range());
@@ -26,7 +26,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
-    renderer.set_clips(&clips)?;
+    renderer.set_clips(&turn.clips(&clips))?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let timings = renderer.update(&mut |done| progress.set(done))?;

@@ -31,27 +31,28 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
     override_scene(&mut scene, args, matches)?;
-    let mut volume = args::open(&scene.volume, args.raw.choices.or(scene.reading), &args.input)?;
+    let volume = args::open(&scene.volume, args.raw.choices.or(scene.reading), &args.input)?;
+    let (mut volume, turn) = scene.frame.arrange(volume)?;
     let transfer = match &args.settings.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range()),
         None => scene.transfer(volume.range()),
     };
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
-    let look = scene.look;
+    let look = turn.look(&scene.look);
     if !look.occluded {
         // What is not shown is not computed: without a neighbourhood nothing is occluded.
         setup.occlusion.radius_mm = 0.0;
     }
     let size = [scene.image.width, scene.image.height];
-    let rig = scene.stereo.rig(volume.size_mm());
+    let rig = turn.rig(&scene.stereo.rig(turn.extent(volume.size_mm())));
     let reach = rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>();
     let views = rig.views(size[0] as f32 / size[1] as f32, reach * 1e-4, reach * 2.0)?;
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
-    renderer.set_clips(&scene.clips)?;
+    renderer.set_clips(&turn.clips(&scene.clips))?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
@@ -82,6 +83,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
 
 /// Flags win over the scene file; clips from flags are added to the scene's.
 fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Result<()> {
+    scene.frame = args.frame.unwrap_or(scene.frame);
     let s = &args.settings;
     let o = &mut scene.occlusion;
     // A rule that the scene's method does not have asks for another method.
