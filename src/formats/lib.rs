@@ -3,8 +3,13 @@
 
 #![forbid(unsafe_code)]
 
+mod analyze;
+#[cfg(feature = "dicom")]
+mod dicom;
 pub mod error;
+mod foreign;
 mod grid;
+mod listing;
 mod metaimage;
 mod nifti;
 mod nrrd;
@@ -14,6 +19,7 @@ pub mod picture;
 mod raw;
 pub mod scene;
 mod text;
+mod tiff_stack;
 mod toml_value;
 pub mod transfer;
 pub mod volume;
@@ -23,5 +29,5 @@ pub use error::{Error, Result};
 pub use picture::Picture;
 pub use raw::read_raw;
 pub use scene::Scene;
-pub use volume::{open, read};
+pub use volume::{open, read, read_series};
 pub use write::{write_atomic, write_nrrd};

@@ -46,13 +46,13 @@ pub(crate) fn read(path: &Path) -> Result<Volume> {
     assemble(path, dims.map(|d| d as usize), grid, values, scale)
 }
 
-fn has_extension(path: &Path, extension: &str) -> bool {
+pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
     let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
     name.ends_with(&format!(".{extension}"))
 }
 
 /// The other file of a pair: with this extension, or with it and `.gz` when only that one is there.
-fn partner(path: &Path, extension: &str) -> PathBuf {
+pub(crate) fn partner(path: &Path, extension: &str) -> PathBuf {
     let stem = if has_extension(path, "gz") { path.with_extension("") } else { path.to_path_buf() };
     let plain = stem.with_extension(extension);
     let compressed = stem.with_extension(format!("{extension}.gz"));
@@ -60,7 +60,7 @@ fn partner(path: &Path, extension: &str) -> PathBuf {
 }
 
 /// The first bytes after decompression, and whether there was any.
-fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
+pub(crate) fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
     let io = |source| Error::Io { path: path.into(), source };
     let mut file = File::open(path).map_err(io)?;
     let mut magic = Vec::new();

@@ -8,6 +8,7 @@
 //! let scene = cao_formats::Scene::from_toml(
 //!     r##"
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
+//!     ## volume = { dicom = "scan", series = "2" }       # one series of a folder: its number in the list, or its UID
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
 //!     transfer = "paper"               # a preset, a file, or the table [transfer] with the keys of such a file
@@ -102,8 +103,15 @@ pub struct Scene {
 pub enum VolumeSource {
     /// A built-in volume, as `builtin:NAME:SIZE`.
     Builtin(String),
-    /// A file that describes itself.
+    /// A file that describes itself, or a folder of slices.
     File(PathBuf),
+    /// One DICOM series of several.
+    Series {
+        /// The folder, or a file in it.
+        path: PathBuf,
+        /// Its UID, or its number in the list of series.
+        series: String,
+    },
     /// A file of values only.
     Raw {
         /// The file.
@@ -372,6 +380,13 @@ struct RawFile {
     endian: EndianFile,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SeriesFile {
+    dicom: PathBuf,
+    series: String,
+}
+
 fn unit_spacing() -> [f64; 3] {
     [1.0; 3]
 }
@@ -446,6 +461,15 @@ fn volume(value: Value, base: &Path) -> Result<VolumeSource> {
             VolumeSource::File(path) => Ok(VolumeSource::File(existing("volume", base, &path)?)),
             other => Ok(other),
         },
+        Value::Table(table) if table.contains_key("dicom") => {
+            let file: SeriesFile = table
+                .try_into()
+                .map_err(|error: toml::de::Error| Error::refused("volume", error.message()))?;
+            Ok(VolumeSource::Series {
+                path: existing("volume.dicom", base, &file.dicom)?,
+                series: file.series,
+            })
+        }
         Value::Table(table) => {
             let raw: RawFile = table
                 .try_into()
@@ -469,7 +493,7 @@ fn volume(value: Value, base: &Path) -> Result<VolumeSource> {
         }
         other => {
             let problem = format!(
-                "{}: expected a file, builtin:NAME:SIZE, or a table with raw, dims, type",
+                "{}: expected a file, builtin:NAME:SIZE, or a table with raw, dims, type or with dicom, series",
                 shown(&other)
             );
             Err(Error::refused("volume", problem))

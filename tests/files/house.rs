@@ -50,7 +50,19 @@ const CRATES: &[Crate] = &[
         "src/formats",
         "cao-formats",
         &["cao-model"],
-        &["flate2", "glam", "image", "serde", "thiserror", "tobj", "toml"],
+        &[
+            "flate2",
+            "glam",
+            "hayro-jpeg2000",
+            "image",
+            "jpeg-decoder",
+            "pure_jpegls",
+            "serde",
+            "thiserror",
+            "tiff",
+            "tobj",
+            "toml",
+        ],
     ),
     // The truth: it must not share code with what it judges, but sizes and codes are said once, in the kernels.
     uses("src/twin", "cao-twin", &["cao-kernels", "cao-model"], &["glam"]),
@@ -207,7 +219,28 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/nrrd.rs", &["error", "grid", "payload", "text", "volume"]),
     ("src/formats/nifti.rs", &["error", "grid", "payload", "volume"]),
     ("src/formats/metaimage.rs", &["error", "grid", "payload", "text", "volume"]),
-    ("src/formats/volume.rs", &["error", "grid", "metaimage", "nifti", "nrrd", "raw", "scene"]),
+    ("src/formats/analyze.rs", &["error", "grid", "nifti", "payload", "volume"]),
+    ("src/formats/listing.rs", &["error", "volume"]),
+    ("src/formats/foreign.rs", &[]),
+    ("src/formats/tiff_stack.rs", &["error", "grid", "volume"]),
+    ("src/formats/dicom/", &["error", "grid", "listing", "volume"]),
+    (
+        "src/formats/volume.rs",
+        &[
+            "analyze",
+            "dicom",
+            "error",
+            "foreign",
+            "grid",
+            "listing",
+            "metaimage",
+            "nifti",
+            "nrrd",
+            "raw",
+            "scene",
+            "tiff_stack",
+        ],
+    ),
     // Kernels' host sides, room by room, and the renderer above them.
     ("src/cao/error.rs", &[]),
     ("src/cao/stages.rs", &[]),
@@ -273,10 +306,14 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 9] = [
+const ONLY_IN: [(&str, &[&str]); 13] = [
     ("ash", &["src/gpu/"]),
     ("gpu_allocator", &["src/gpu/"]),
     ("tobj", &["src/formats/obj.rs"]),
+    ("tiff", &["src/formats/tiff_stack.rs"]),
+    ("jpeg_decoder", &["src/formats/dicom/pixels.rs"]),
+    ("jpegls", &["src/formats/dicom/pixels.rs"]),
+    ("hayro_jpeg2000", &["src/formats/dicom/pixels.rs"]),
     ("kuva", &["src/measure/plot.rs"]),
     ("clap", &["src/cli/"]),
     ("anyhow", &["src/cli/"]),

@@ -4,9 +4,13 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod dicom;
 mod house;
 mod mesh;
+mod places;
+mod references;
 mod scene;
 mod shaders;
+mod stacks;
 mod transfer;
 mod volume_files;

@@ -159,6 +159,12 @@ fn files_are_found_beside_the_scene() {
         let Shape::Mesh(mesh) = &clip.shape else { panic!("a mesh") };
         assert!(mesh.signed_volume() > 3.0, "meshes face outward, whatever the file says");
     }
+    put("series.toml", "volume = { dicom = \"values.raw\", series = \"2\" }");
+    let series = Scene::load(&dir.path().join("series.toml")).unwrap();
+    let path = dir.path().join("values.raw");
+    assert_eq!(series.volume, VolumeSource::Series { path, series: "2".into() });
+    let refusal = series.volume.open().unwrap_err().to_string();
+    assert!(refusal.contains("only DICOM files have series"), "{refusal}");
     put("plain.toml", "volume = \"values.raw\"");
     let plain = Scene::load(&dir.path().join("plain.toml")).unwrap();
     assert_eq!(plain.volume, VolumeSource::File(dir.path().join("values.raw")));

@@ -4,6 +4,7 @@ mod bundle;
 mod chart;
 mod cli;
 mod cli_refusals;
+mod dicom;
 mod peers;
 mod stereo_bench;
 mod support;

@@ -106,10 +106,11 @@ fn scenes(args: &Args) -> Result<Vec<Scene>> {
 }
 
 fn scene(args: &Args, name: &str, radius: Option<f32>) -> Result<Scene> {
-    let described = match name.to_lowercase().ends_with(".toml") {
-        true if args.raw.dims.is_some() => {
-            return Err(usage(format!("--dims: the scene {name} says what its volume is")));
-        }
+    let is_scene = name.to_lowercase().ends_with(".toml");
+    if let Some(flag) = args.raw.given().filter(|_| is_scene) {
+        return Err(usage(format!("{flag}: the scene {name} says what its volume is")));
+    }
+    let described = match is_scene {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };

@@ -18,10 +18,11 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     check_targets(&targets, "png", inputs(args))?;
     let mut progress = Progress::default();
     progress.stage("reading");
-    let mut scene = match args.input.to_lowercase().ends_with(".toml") {
-        true if args.raw.dims.is_some() => {
-            return Err(usage(format!("--dims: the scene {} says what its volume is", args.input)));
-        }
+    let is_scene = args.input.to_lowercase().ends_with(".toml");
+    if let Some(flag) = args.raw.given().filter(|_| is_scene) {
+        return Err(usage(format!("{flag}: the scene {} says what its volume is", args.input)));
+    }
+    let mut scene = match is_scene {
         true => Scene::load(Path::new(&args.input))?,
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
