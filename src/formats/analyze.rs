@@ -75,7 +75,7 @@ pub(crate) fn read(path: &Path) -> Result<Volume> {
         }
     };
     let offset = header.real(108);
-    if !(offset >= 0.0 && offset < 9e15 && offset.fract() == 0.0) {
+    if !((0.0..9e15).contains(&offset) && offset.fract() == 0.0) {
         return Err(bad(path, "vox_offset", format!("{offset}, expected a whole number of bytes")));
     }
     let (slope, intercept) = (header.real(112), header.real(116));

@@ -560,6 +560,16 @@ fn what_makes_no_volume_is_refused_by_name() {
             "ImageOrientationPatient",
             &["length 1"],
         ),
+        (
+            both(numbers(ORIENTATION, &[1.0, 0.0, 0.0, 1.0, 0.0, 0.0])),
+            "ImageOrientationPatient",
+            &["right angles"],
+        ),
+        (
+            [0.0, 1e12].map(|z| File::slice(0).at([0.0, 0.0, z])).to_vec(),
+            "PixelSpacing or ImagePositionPatient",
+            &["mm"],
+        ),
         (both(text(PIXEL_SPACING, b"DS", "a\\b")), "PixelSpacing", &["2 finite numbers"]),
         (
             second(number((0x0028, 0x0010), 6)),

@@ -14,13 +14,13 @@ use cao_model::values::Endian;
 /// Group and element.
 pub(super) type Tag = (u16, u16);
 
-const ITEM: Tag = (0xfffe, 0xe000);
+pub(super) const ITEM: Tag = (0xfffe, 0xe000);
 const ITEM_END: Tag = (0xfffe, 0xe00d);
-const SEQUENCE_END: Tag = (0xfffe, 0xe0dd);
+pub(super) const SEQUENCE_END: Tag = (0xfffe, 0xe0dd);
 /// Pixels as floating point, as double, as integers; what follows them is of no interest.
 pub(super) const FLOAT_PIXELS: Tag = (0x7fe0, 0x0008);
 pub(super) const DOUBLE_PIXELS: Tag = (0x7fe0, 0x0009);
-pub(super) const PIXELS: Tag = (0x7fe0, 0x0010);
+const PIXELS: Tag = (0x7fe0, 0x0010);
 const TRANSFER_SYNTAX: Tag = (0x0002, 0x0010);
 
 /// Length of a sequence or item that ends by a delimiter.
@@ -116,8 +116,17 @@ fn bare(head: &[u8]) -> Option<Coding> {
     }
 }
 
-/// Opens the data set of a file: what to read, its length, where it begins, how it is written, its transfer syntax.
-fn open(path: &Path) -> Result<(Box<dyn Source>, u64, u64, Coding, String)> {
+/// The data set of a file.
+struct Opened {
+    source: Box<dyn Source>,
+    length: u64,
+    /// Where its first element is.
+    start: u64,
+    coding: Coding,
+    syntax: String,
+}
+
+fn open(path: &Path) -> Result<Opened> {
     let mut file = File::open(path).map_err(Error::io(path))?;
     let length = file.metadata().map_err(Error::io(path))?.len();
     let mut head = Vec::new();
@@ -145,7 +154,7 @@ fn open(path: &Path) -> Result<(Box<dyn Source>, u64, u64, Coding, String)> {
         _ => IMPLICIT,
     };
     if !deflated {
-        return Ok((Box::new(file), length, at as u64, coding, syntax));
+        return Ok(Opened { source: Box::new(file), length, start: at as u64, coding, syntax });
     }
     file.seek(SeekFrom::Start(at as u64)).map_err(Error::io(path))?;
     let mut inflated = Vec::new();
@@ -156,19 +165,19 @@ fn open(path: &Path) -> Result<(Box<dyn Source>, u64, u64, Coding, String)> {
         let problem = format!("more than {MAX_INFLATED} bytes after decompression, expected at most that");
         return Err(bad(path, "data", problem));
     }
-    Ok((Box::new(Cursor::new(inflated)), length, 0, coding, syntax))
+    Ok(Opened { source: Box::new(Cursor::new(inflated)), length, start: 0, coding, syntax })
 }
 
 /// What the pixels are read from, and its length.
 pub(super) fn source(path: &Path) -> Result<(Box<dyn Source>, u64)> {
-    let (source, length, ..) = open(path)?;
+    let Opened { source, length, .. } = open(path)?;
     Ok((source, length))
 }
 
 impl Header {
     /// Reads a file up to its pixels.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let (mut source, length, start, coding, syntax) = open(path)?;
+        let Opened { mut source, length, start, coding, syntax } = open(path)?;
         let mut bytes = Vec::new();
         // Most headers are a few kB; what is larger is read in ever larger pieces.
         let mut want = 1 << 14;
@@ -410,7 +419,7 @@ impl<'a> DataSet<'a> {
 }
 
 /// A tag as the standard writes it.
-fn name(tag: Tag) -> String {
+pub(super) fn name(tag: Tag) -> String {
     format!("({:04X},{:04X})", tag.0, tag.1)
 }
 
@@ -425,46 +434,4 @@ fn ordered<const N: usize>(mut bytes: [u8; N], endian: Endian) -> [u8; N] {
         bytes.reverse();
     }
     bytes
-}
-
-/// Fragments of encapsulated pixels: table of offsets (perhaps empty), then where each fragment lies: start, length.
-pub(super) fn fragments(
-    source: &mut dyn Source,
-    pixels: Pixels,
-    end: u64,
-) -> Result<(Vec<u64>, Vec<(u64, u32)>), String> {
-    let mut at = pixels.start;
-    let mut offsets = None;
-    let mut list = Vec::new();
-    loop {
-        let mut head = [0; 8];
-        source.seek(SeekFrom::Start(at)).map_err(|e| e.to_string())?;
-        // Some writers leave out the delimiter at the end.
-        if at >= end && !list.is_empty() {
-            break;
-        }
-        source.read_exact(&mut head).map_err(|_| "the fragments are cut off".to_owned())?;
-        let tag = (u16::from_le_bytes([head[0], head[1]]), u16::from_le_bytes([head[2], head[3]]));
-        let length = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
-        let start = at + 8;
-        match tag {
-            SEQUENCE_END => break,
-            ITEM if u64::from(length) <= end.saturating_sub(start) => {}
-            ITEM => {
-                return Err(format!(
-                    "a fragment of {length} bytes at byte {start} runs past the end of the file"
-                ));
-            }
-            other => return Err(format!("{} among the fragments, expected an item", name(other))),
-        }
-        if offsets.is_none() {
-            let mut table = vec![0; length as usize];
-            source.read_exact(&mut table).map_err(|e| e.to_string())?;
-            offsets = Some(table.as_chunks::<4>().0.iter().map(|c| u32::from_le_bytes(*c).into()).collect());
-        } else {
-            list.push((start, length));
-        }
-        at = start + u64::from(length);
-    }
-    Ok((offsets.unwrap_or_default(), list))
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::data_set::{DOUBLE_PIXELS, DataSet, FLOAT_PIXELS, Header, PIXELS, Pixels, Tag};
+use super::data_set::{DOUBLE_PIXELS, DataSet, FLOAT_PIXELS, Header, Pixels, Tag};
 use crate::Result;
 use crate::volume::bad;
 
@@ -180,8 +180,7 @@ impl Reading<'_> {
         match pixels.tag {
             FLOAT_PIXELS => return Ok(Sample::Float),
             DOUBLE_PIXELS => return Ok(Sample::Double),
-            PIXELS => {}
-            _ => unreachable!("the header ends at one of these"),
+            _ => {}
         }
         let allocated = set.u16(ALLOCATED).unwrap_or(0);
         if ![8, 16, 32].contains(&allocated) {

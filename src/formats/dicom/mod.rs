@@ -6,6 +6,7 @@
 //! their results, as 64-bit floating point. MONOCHROME1 changes no value: it only asks a display to show low ones bright.
 
 mod data_set;
+mod fragments;
 mod image;
 mod pixels;
 mod stack;
@@ -21,9 +22,8 @@ use image::{Entry, Image};
 
 pub(crate) use data_set::is_dicom;
 
-/// What blank images may expand to whatever the size of their files, in bytes; beyond, 1000 times that size.
+/// What blank images may expand to whatever the size of their files, in bytes; beyond, [`pixels::MAX_RATIO`] times that.
 const BLANK: u64 = 1 << 30;
-const MAX_RATIO: u64 = 1000;
 /// Series that a refusal lists.
 const MOST_LISTED: usize = 30;
 
@@ -134,8 +134,8 @@ fn volume(path: &Path, entries: Vec<Entry>) -> Result<Volume> {
         on_disk += std::fs::metadata(&image.path).map_err(Error::io(&image.path))?.len();
     }
     let bytes = count as u64 * kind.bytes() as u64;
-    let room =
-        (bytes <= BLANK + on_disk.saturating_mul(MAX_RATIO)).then(|| Values::with_capacity(kind, count));
+    let room = (bytes <= BLANK + on_disk.saturating_mul(pixels::MAX_RATIO))
+        .then(|| Values::with_capacity(kind, count));
     let Some(mut values) = room.flatten() else {
         let problem =
             format!("{bytes} bytes of values are more than {on_disk} bytes of files or the memory can hold");

@@ -3,6 +3,7 @@
 use std::io::{Cursor, SeekFrom};
 
 use super::data_set::{self, Source};
+use super::fragments::{self, Piece};
 use super::image::{Image, Sample};
 use crate::volume::bad;
 use crate::{Error, Result};
@@ -49,7 +50,7 @@ const EXPECTED: &str = "expected uncompressed, deflated, RLE, JPEG (baseline, lo
 /// A frame of up to this many bytes may be as blank as it likes; a larger one does not expand more than
 /// [`MAX_RATIO`] times.
 const SMALL_FRAME: u64 = 64 << 20;
-const MAX_RATIO: u64 = 1000;
+pub(super) const MAX_RATIO: u64 = 1000;
 
 impl Image {
     /// Voxels of a frame.
@@ -87,8 +88,7 @@ pub(super) struct Frames<'a> {
     image: &'a Image,
     source: Box<dyn Source>,
     codec: Codec,
-    /// Start and length of the pieces of each frame.
-    pieces: Vec<Vec<(u64, u64)>>,
+    pieces: Vec<Vec<Piece>>,
 }
 
 impl<'a> Frames<'a> {
@@ -119,10 +119,8 @@ impl<'a> Frames<'a> {
                 return Err(wrong("not encapsulated, but compressed by its transfer syntax".into()));
             }
             (None, _) => {
-                let (offsets, fragments) =
-                    data_set::fragments(source.as_mut(), image.pixels, end).map_err(wrong)?;
-                let offsets = if image.offsets.is_empty() { offsets } else { image.offsets.clone() };
-                let pieces = assigned(&fragments, &offsets, image.frames.len()).map_err(wrong)?;
+                let frames = (image.frames.len(), image.offsets.as_slice());
+                let pieces = fragments::pieces(source.as_mut(), image.pixels, end, frames).map_err(wrong)?;
                 for (i, frame) in pieces.iter().enumerate() {
                     let have: u64 = frame.iter().map(|(_, length)| length).sum();
                     if each > SMALL_FRAME && have.saturating_mul(MAX_RATIO) < each {
@@ -207,36 +205,6 @@ impl<'a> Frames<'a> {
         };
         Ok((bytes, Endian::Little))
     }
-}
-
-/// Which fragments make up which frame (PS3.5 §A.4).
-fn assigned(
-    fragments: &[(u64, u32)],
-    offsets: &[u64],
-    frames: usize,
-) -> Result<Vec<Vec<(u64, u64)>>, String> {
-    let piece = |(start, length): &(u64, u32)| (*start, u64::from(*length));
-    if frames == 1 {
-        return Ok(vec![fragments.iter().map(piece).collect()]);
-    }
-    if frames == fragments.len() {
-        return Ok(fragments.iter().map(|f| vec![piece(f)]).collect());
-    }
-    let first = fragments.first().map_or(0, |f| f.0);
-    if offsets.len() != frames || fragments.len() < frames {
-        return Err(format!(
-            "{} fragments and a table of {} offsets for {frames} frames, expected as many of either",
-            fragments.len(),
-            offsets.len()
-        ));
-    }
-    let mut pieces = vec![Vec::new(); frames];
-    for fragment in fragments {
-        // Offsets are those of the fragments' heads, from that of the first.
-        let frame = offsets.partition_point(|offset| *offset <= fragment.0 - first);
-        pieces[frame.saturating_sub(1)].push(piece(fragment));
-    }
-    Ok(pieces)
 }
 
 /// RLE of PS3.5 annex G: a segment of packed bits for every byte of the values, most significant first.

@@ -7,6 +7,7 @@ use super::image::{Frame, Image, cross};
 use crate::Result;
 use crate::grid::{self, Grid};
 use crate::volume::bad;
+use cao_model::volume::check_spacing;
 
 /// Slices at least this share of a pixel's edge apart are at different places.
 const APART: f64 = 0.01;
@@ -16,6 +17,8 @@ const EVEN: f64 = 0.1;
 const GAP: f64 = 1.5;
 /// Directions and pixel sizes that differ by less are equal: headers round them.
 const SAME: f64 = 1e-3;
+/// Lengths of directions, and cosines between them, are off by no more.
+const UNIT: f64 = 0.01;
 
 /// A frame among several images: which image, which of its frames.
 pub(super) type Place = (usize, usize);
@@ -71,8 +74,9 @@ pub(super) fn stack(path: &Path, images: &[Image]) -> Result<(Vec<Place>, Grid)>
         }
     }
     let lengths = orientation.map(|v| dot(v, v).sqrt());
-    if !lengths.iter().all(|length| (length - 1.0).abs() < 0.01) {
-        let problem = format!("{orientation:?}, expected two directions of length 1");
+    let right = dot(orientation[0], orientation[1]).abs() < UNIT;
+    if !(right && lengths.iter().all(|length| (length - 1.0).abs() < UNIT)) {
+        let problem = format!("{orientation:?}, expected two directions of length 1 at right angles");
         return Err(bad(path, "ImageOrientationPatient", problem));
     }
     // Rounded in the header, so not quite of length 1.
@@ -148,6 +152,7 @@ pub(super) fn stack(path: &Path, images: &[Image]) -> Result<(Vec<Place>, Grid)>
         let tilt = (length / dot(step, step).sqrt()).clamp(-1.0, 1.0).acos().to_degrees();
         bad(path, "ImagePositionPatient", format!("gantry tilt of {tilt:.1}°: {problem}"))
     })?;
+    check_spacing(spacing).map_err(|p| bad(path, "PixelSpacing or ImagePositionPatient", p))?;
     let grid = Grid { spacing, origin: start.position, directions, ..Grid::plain(spacing) };
     Ok((order, grid.flipped([-1.0, -1.0, 1.0])))
 }
