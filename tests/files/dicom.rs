@@ -341,6 +341,10 @@ fn every_coding_and_codec_gives_the_same_values() {
         folder.put("a", &File::slice(0).compressed(syntax, vec![a.to_vec(), b.to_vec()]));
         assert_eq!(stored(&cao_formats::read(&path).unwrap()), ("uint16", slices_at(&[0])), "{syntax}");
     }
+    // Encapsulated as it is, with padding.
+    let raw = STORED.iter().flat_map(|v| v.to_le_bytes()).chain([0, 0]).collect();
+    let path = folder.put("a", &File::slice(0).compressed("1.2.840.10008.1.2.1.98", vec![raw]));
+    assert_eq!(stored(&cao_formats::read(&path).unwrap()), ("uint16", slices_at(&[0])));
     let grey = File::slice(0).compressed("1.2.840.10008.1.2.4.50", vec![hex(JPEG)]);
     let grey = [(0x0010, 8), (0x0011, 8), (0x0100, 8), (0x0101, 8), (0x0102, 7)]
         .into_iter()

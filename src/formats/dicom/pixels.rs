@@ -194,10 +194,14 @@ impl<'a> Frames<'a> {
     }
 
     /// Words of a frame and their byte order.
-    fn decoded(&self, bytes: Vec<u8>) -> Result<(Vec<u8>, Endian), String> {
+    fn decoded(&self, mut bytes: Vec<u8>) -> Result<(Vec<u8>, Endian), String> {
         let image = self.image;
         let bytes = match self.codec {
-            Codec::Native => return Ok((bytes, image.pixels.endian)),
+            Codec::Native => {
+                // An encapsulated frame is padded to an even length.
+                bytes.truncate(image.frame_bytes() as usize);
+                return Ok((bytes, image.pixels.endian));
+            }
             Codec::RunLengths => run_lengths(&bytes, image.frame_len(), image.frame_bytes())?,
             Codec::Jpeg => jpeg(&bytes, image)?,
             Codec::JpegLs => jpeg_ls(&bytes, image)?,
