@@ -59,6 +59,9 @@ pub struct Raw {
     /// Order of a value's bytes: little or big [default: little]
     #[arg(long, value_name = "ORDER", value_parser = endian, requires = "dims")]
     pub endian: Option<Endian>,
+    /// The DICOM series to read where a folder has several: its number in the list that is then printed, or its UID
+    #[arg(long, value_name = "N|UID", conflicts_with = "dims", help_heading = "DICOM")]
+    pub series: Option<String>,
     /// What the file leaves open.
     #[command(flatten)]
     pub choices: Choices,
@@ -149,6 +152,11 @@ fn by_method(say: impl Fn(&Entry) -> String) -> String {
 }
 
 impl Raw {
+    /// A flag that says what the volume is; a scene says that itself.
+    pub fn given(&self) -> Option<&'static str> {
+        self.dims.map(|_| "--dims").or(self.series.as_ref().map(|_| "--series"))
+    }
+
     /// What the user means by the name of a volume.
     pub fn source(&self, input: &OsStr) -> Result<VolumeSource> {
         let source = VolumeSource::parse(input);
@@ -161,6 +169,13 @@ impl Raw {
                 big_endian: self.endian == Some(Endian::Big),
             }),
             (Some(_), ..) => Err(usage(format!("--dims: {} has dimensions of its own", printable(input)))),
+            (None, _, VolumeSource::File(path)) => Ok(match &self.series {
+                Some(series) => VolumeSource::Series { path, series: series.clone() },
+                None => VolumeSource::File(path),
+            }),
+            (None, ..) if self.series.is_some() => {
+                Err(usage(format!("--series: {} has no DICOM series", printable(input))))
+            }
             (None, _, source) => Ok(source),
         }
     }

@@ -29,6 +29,24 @@ pub enum Error {
         /// What was found and what was expected.
         problem: String,
     },
+    /// A file or a folder has several of what only one can be used of.
+    #[error(
+        "{}: {}: {}{}",
+        shown_path(path),
+        shown(field, MOST_NAMED),
+        shown(problem, MOST_SAID),
+        listed(choices)
+    )]
+    Choice {
+        /// The file or the folder.
+        path: PathBuf,
+        /// What is to be chosen.
+        field: String,
+        /// What was found and how to choose.
+        problem: String,
+        /// What there is, each a line of the message.
+        choices: Vec<String>,
+    },
     /// Data that cannot be worked with.
     #[error(transparent)]
     Model(#[from] cao_model::Error),
@@ -75,6 +93,10 @@ impl Error {
     pub(crate) fn io(path: &Path) -> impl Fn(std::io::Error) -> Self + Copy + '_ {
         |source| Self::Io { path: path.into(), source }
     }
+}
+
+fn listed(choices: &[String]) -> String {
+    choices.iter().map(|choice| format!("\n  {}", shown(choice, MOST_NAMED))).collect()
 }
 
 /// A name as a message shows it: without what would move the cursor of a terminal or begin a line of its own, and of bounded length.

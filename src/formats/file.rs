@@ -2,26 +2,32 @@
 //! waiting for it: a pipe would block until somebody writes, a device may have no end.
 
 use crate::{Error, Result, input};
-use std::fs::{File, FileType, OpenOptions};
+use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{self, Read};
 use std::path::Path;
 
 /// Longest text of a scene, a transfer function or a table of numbers. None is nearly this long.
 pub const MAX_TEXT_BYTES: u64 = 4 << 20;
 
-/// A regular file, and its length in bytes. Links are followed.
+/// A regular file that is read, and its length in bytes. Links are followed.
 pub(crate) fn open(path: &Path) -> io::Result<(File, u64)> {
+    let (file, metadata) = regular(path)?;
+    input::remember(path, &metadata)?;
+    Ok((file, metadata.len()))
+}
+
+/// A regular file that is only looked at.
+pub(crate) fn regular(path: &Path) -> io::Result<(File, Metadata)> {
     // Looked at before, because opening alone makes some devices do something; and after, because a name can change its file.
-    regular(std::fs::metadata(path)?.file_type())?;
+    check(std::fs::metadata(path)?.file_type())?;
     let mut options = OpenOptions::new();
     options.read(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
     let file = options.open(path)?;
     let metadata = file.metadata()?;
-    regular(metadata.file_type())?;
-    input::remember(path, &metadata)?;
-    Ok((file, metadata.len()))
+    check(metadata.file_type())?;
+    Ok((file, metadata))
 }
 
 /// Everything in a regular file of at most `most` bytes.
@@ -54,7 +60,7 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
-fn regular(kind: FileType) -> io::Result<()> {
+fn check(kind: FileType) -> io::Result<()> {
     if kind.is_file() {
         return Ok(());
     }

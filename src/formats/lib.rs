@@ -3,11 +3,16 @@
 
 #![forbid(unsafe_code)]
 
+mod analyze;
+#[cfg(feature = "dicom")]
+mod dicom;
 pub mod error;
 pub mod file;
+mod foreign;
 mod grid;
 mod gzip;
 pub mod input;
+mod listing;
 mod memory;
 mod metaimage;
 mod nifti;
@@ -22,6 +27,7 @@ mod raw;
 mod reading;
 pub mod scene;
 mod text;
+mod tiff_stack;
 mod toml_value;
 pub mod transfer;
 pub mod volume;
@@ -33,5 +39,5 @@ pub use picture::Picture;
 pub use raw::read_raw;
 pub use reading::{NoNumbers, Opened, Reading};
 pub use scene::Scene;
-pub use volume::{open, read, read_as};
+pub use volume::{open, read, read_as, read_series};
 pub use write::write_nrrd;

@@ -50,14 +50,14 @@ pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     assemble(path, Found { dims: dims.map(|d| d as usize), grid, values, scale, warnings }, reading)
 }
 
-fn has_extension(path: &Path, extension: &str) -> bool {
+pub(crate) fn has_extension(path: &Path, extension: &str) -> bool {
     let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
     name.ends_with(&format!(".{extension}"))
 }
 
 /// The other file of a pair: with this extension in small letters, capitals or a capital, or with it and `.gz` when only that one is
 /// there.
-fn partner(path: &Path, extension: &str) -> PathBuf {
+pub(crate) fn partner(path: &Path, extension: &str) -> PathBuf {
     let stem = if has_extension(path, "gz") { path.with_extension("") } else { path.to_path_buf() };
     let capitals = extension.to_uppercase();
     let capital = format!("{}{}", &capitals[..1], &extension[1..]);
@@ -72,7 +72,7 @@ fn partner(path: &Path, extension: &str) -> PathBuf {
 }
 
 /// The first bytes after decompression, and whether there was any.
-fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
+pub(crate) fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
     let io = Error::io(path);
     let (mut file, _) = file::open(path).map_err(io)?;
     let mut magic = Vec::new();

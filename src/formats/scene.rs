@@ -9,6 +9,7 @@
 //!     r##"
 //!     volume = "builtin:engine:128"    # or a file: "head.nrrd"; or a file without header:
 //!     ## volume = { file = "fmri.nii.gz", frame_index = 7, nan = "transparent" }  # one of a series, from 0; or a value for NaN
+//!     ## volume = { dicom = "scan", series = "2" }       # one series of a folder: its number in the list, or its UID
 //!     ## volume = { raw = "engine.raw", dims = [256, 256, 128], type = "uint8", spacing_mm = [1, 1, 1], endian = "little" }
 //!
 //!     frame = "patient"                # right, anterior, superior where the file states them, else index axes; "index": as stored
@@ -111,8 +112,15 @@ pub struct Scene {
 pub enum VolumeSource {
     /// A built-in volume, as `builtin:NAME:SIZE`.
     Builtin(String),
-    /// A file that describes itself.
+    /// A file that describes itself, or a folder of slices.
     File(PathBuf),
+    /// One DICOM series of several.
+    Series {
+        /// The folder, or a file in it.
+        path: PathBuf,
+        /// Its UID, or its number in the list of series.
+        series: String,
+    },
     /// A file of values only.
     Raw {
         /// The file.
@@ -400,6 +408,14 @@ struct RawFile {
     nan: Option<Value>,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SeriesFile {
+    dicom: PathBuf,
+    series: String,
+    nan: Option<Value>,
+}
+
 fn unit_spacing() -> [f64; 3] {
     [1.0; 3]
 }
@@ -484,6 +500,14 @@ fn volume(value: Value, base: &Path) -> Result<(VolumeSource, Reading)> {
                 Reading { frame_index: named.frame_index, no_numbers: no_numbers(named.nan.as_ref())? };
             Ok((VolumeSource::File(existing("volume.file", base, &named.file)?), reading))
         }
+        Value::Table(table) if table.contains_key("dicom") => {
+            let file: SeriesFile = table
+                .try_into()
+                .map_err(|error: toml::de::Error| Error::refused("volume", error.message()))?;
+            let reading = Reading { no_numbers: no_numbers(file.nan.as_ref())?, ..Reading::default() };
+            let path = existing("volume.dicom", base, &file.dicom)?;
+            Ok((VolumeSource::Series { path, series: file.series }, reading))
+        }
         Value::Table(table) => {
             let raw: RawFile = table
                 .try_into()
@@ -509,7 +533,7 @@ fn volume(value: Value, base: &Path) -> Result<(VolumeSource, Reading)> {
         }
         other => {
             let problem = format!(
-                "{}: expected a file, builtin:NAME:SIZE, or a table with file, or with raw, dims, type",
+                "{}: expected a file, builtin:NAME:SIZE, or a table with file, with dicom, series, or with raw, dims, type",
                 shown(&other)
             );
             Err(Error::refused("volume", problem))

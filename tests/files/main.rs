@@ -4,14 +4,18 @@
 use cao_gpu as gpu;
 
 mod builtin;
+mod dicom;
 mod fuzz;
 mod hostile;
 mod house;
 mod mesh;
 mod orders;
 mod outputs;
+mod places;
 mod readings;
+mod references;
 mod scene;
 mod shaders;
+mod stacks;
 mod transfer;
 mod volume_files;

@@ -38,9 +38,10 @@ fn assert_series(path: &Path, field: &str) {
     for f in 0..FRAMES {
         let found = read_as(path, &frame(f as u64)).unwrap_or_else(|e| panic!("frame {f}: {e}"));
         let expected: Vec<i16> = (0..COUNT).map(|voxel| (1000 * f + voxel) as i16).collect();
-        assert_eq!(found.volume.values, Values::I16(expected), "{} frame {f}", path.display());
-        assert_eq!((found.volume.dims, found.volume.spacing), (DIMS, [0.5, 1.0, 2.0]));
         assert_eq!(found.warnings, [""; 0], "{}", path.display());
+        let volume = found.volume.into_stored().unwrap();
+        assert_eq!(volume.values, Values::I16(expected), "{} frame {f}", path.display());
+        assert_eq!((volume.dims, volume.spacing), (DIMS, [0.5, 1.0, 2.0]));
     }
     assert_refused(cao_formats::read(path), path, field, &["a series of 4 volumes", "--frame-index 0 … 3"]);
     assert_refused(read_as(path, &frame(4)), path, field, &["4 volumes, 0 … 3", "--frame-index 4"]);
@@ -121,7 +122,7 @@ fn four_axes_as_itk_writes_them_are_a_volume_or_a_series() {
         ("space: scanner-xyz-time", false),
     ] {
         let path = folder.put("a.nrrd", &joined(&itk_nrrd("5 3 2 1", space), &one));
-        let volume = opened(&path).volume;
+        let volume = opened(&path).volume.into_stored().unwrap();
         assert_eq!((volume.dims, &volume.values, volume.spacing), (DIMS, &nrrd_values(), [0.5, 1.0, 2.0]));
         let turned = if known { (Space::Ras, -1.0) } else { (Space::Unknown, 1.0) };
         assert_eq!(volume.space, turned.0);
@@ -144,7 +145,8 @@ fn four_axes_as_itk_writes_them_are_a_volume_or_a_series() {
         ])
     };
     let matrix = "0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1";
-    let volume = opened(&folder.put("a.mha", &joined(&meta("5 3 2 1", matrix), &one))).volume;
+    let volume =
+        opened(&folder.put("a.mha", &joined(&meta("5 3 2 1", matrix), &one))).volume.into_stored().unwrap();
     assert_eq!((volume.dims, volume.values, volume.spacing), (DIMS, nrrd_values(), [0.5, 1.0, 2.0]));
     assert_close(volume.origin, [-1.0, -2.0, 3.0]);
     assert_close(volume.directions[0], [0.0, -1.0, 0.0]);

@@ -169,6 +169,12 @@ fn files_are_found_beside_the_scene() {
             "a solid, whichever way it faces"
         );
     }
+    put("series.toml", "volume = { dicom = \"values.raw\", series = \"2\" }");
+    let series = Scene::load(&dir.path().join("series.toml")).unwrap();
+    let path = dir.path().join("values.raw");
+    assert_eq!(series.volume, VolumeSource::Series { path, series: "2".into() });
+    let refusal = series.volume.open(&cao_formats::Reading::default()).unwrap_err().to_string();
+    assert!(refusal.contains("only DICOM files have series"), "{refusal}");
     put("plain.toml", "volume = \"values.raw\"");
     let plain = Scene::load(&dir.path().join("plain.toml")).unwrap();
     assert_eq!(plain.volume, VolumeSource::File(dir.path().join("values.raw")));

@@ -1136,8 +1136,9 @@ fn raw_names_what_does_not_fit() {
 #[test]
 fn unknown_content_is_refused_with_the_formats_that_are_known() {
     let folder = Folder::new();
-    let path = folder.put("a.png", b"\x89PNG\r\n\x1a\n");
-    assert_refused(cao_formats::read(&path), &path, "format", &["NRRD", "NIfTI", "MetaImage", "raw"]);
+    let path = folder.put("a.xyz", b"\x89XYZ\r\n\x1a\n");
+    let known = ["NRRD", "NIfTI", "ANALYZE", "MetaImage", "TIFF", "DICOM", "raw"];
+    assert_refused(cao_formats::read(&path), &path, "format", &known);
     let path = folder.put("empty", b"");
     assert_refused(cao_formats::read(&path), &path, "format", &["NRRD"]);
     let path = folder.put("a.gz", &gzip(b"something else"));
@@ -1147,10 +1148,9 @@ fn unknown_content_is_refused_with_the_formats_that_are_known() {
 #[test]
 fn a_file_that_cannot_be_opened_is_named() {
     let folder = Folder::new();
-    for path in [folder.0.path().join("gone.nrrd"), folder.0.path().to_path_buf()] {
-        let error = cao_formats::open(path.to_str().unwrap()).unwrap_err();
-        assert!(matches!(&error, Error::Io { path: found, .. } if *found == path), "{error:?}");
-    }
+    let path = folder.0.path().join("gone.nrrd");
+    let error = cao_formats::open(path.to_str().unwrap()).unwrap_err();
+    assert!(matches!(&error, Error::Io { path: found, .. } if *found == path), "{error:?}");
 }
 
 #[test]

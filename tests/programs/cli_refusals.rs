@@ -104,7 +104,24 @@ fn malformed_volumes_are_refused_by_file_and_field_whatever_the_command() {
         refused(&folder, &format!("verify {name} --json"), FAILURE, &[name]);
     }
     refused(&folder, "info gone.nrrd", FAILURE, &["gone.nrrd", "No such file"]);
-    refused(&folder, "info .", FAILURE, &["cannot access ."]);
+    std::fs::create_dir(folder.path("scan")).unwrap();
+    refused(&folder, "info scan", FAILURE, &["scan", "0 files", "looked for DICOM", "TIFF"]);
+    refused(&folder, "info scan --series 1", FAILURE, &["scan", "series", "no DICOM"]);
+    refused(&folder, "info gone.dcm --series 1", FAILURE, &["gone.dcm", "No such file"]);
+    folder.put("scene.toml", "volume = \"short.nrrd\"");
+    refused(
+        &folder,
+        "render scene.toml --series 1 -o a.png",
+        USAGE,
+        &["--series: the scene scene.toml says"],
+    );
+    refused(
+        &folder,
+        "info builtin:engine:8 --series 1",
+        USAGE,
+        &["--series: builtin:engine:8 has no DICOM series"],
+    );
+    refused(&folder, "info ct.raw --series 1 --dims 4,4,4 --type u8", USAGE, &["--series", "--dims"]);
     refused(&folder, "info builtin:nothing:8 --json", FAILURE, &["nothing", "expected one of engine"]);
     refused(&folder, "occlusion builtin:engine:0 -o ao.nrrd", FAILURE, &["builtin:engine:0", "at least 1"]);
     refused(&folder, "occlusion builtin:engine:99999 -o ao.nrrd", FAILURE, &["99999", "the limit is"]);

@@ -5,6 +5,7 @@ mod chart;
 mod cli;
 mod cli_outputs;
 mod cli_refusals;
+mod dicom;
 mod orders;
 mod peers;
 mod readings;

@@ -118,10 +118,11 @@ fn scenes(args: &Args) -> Result<Vec<Scene>> {
 }
 
 fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
-    let described = match args::has_extension(name, "toml") {
-        true if args.raw.dims.is_some() => {
-            return Err(usage(format!("--dims: the scene {} says what its volume is", printable(name))));
-        }
+    let is_scene = args::has_extension(name, "toml");
+    if let Some(flag) = args.raw.given().filter(|_| is_scene) {
+        return Err(usage(format!("{flag}: the scene {} says what its volume is", printable(name))));
+    }
+    let described = match is_scene {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };

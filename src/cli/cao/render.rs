@@ -20,13 +20,12 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let targets = Targets::files(args.output.iter().chain(&args.eyes), "png")?;
     let mut progress = Progress::default();
     progress.stage("reading");
-    let mut scene = match args::has_extension(&args.input, "toml") {
-        true if args.raw.dims.is_some() => {
-            return Err(usage(format!(
-                "--dims: the scene {} says what its volume is",
-                printable(&args.input)
-            )));
-        }
+    let is_scene = args::has_extension(&args.input, "toml");
+    if let Some(flag) = args.raw.given().filter(|_| is_scene) {
+        let scene = printable(&args.input);
+        return Err(usage(format!("{flag}: the scene {scene} says what its volume is")));
+    }
+    let mut scene = match is_scene {
         true => Scene::load(Path::new(&args.input))?,
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
