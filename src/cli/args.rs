@@ -1,11 +1,11 @@
 //! Flags that the programs share, and what they mean.
 
 use anyhow::{Context, Result};
-use cao_formats::printable;
 use cao_formats::scene::VolumeSource;
 use cao_formats::{NoNumbers, Reading};
 use cao_model::METHODS;
 use cao_model::clip::Shape;
+use cao_model::error::shown_path;
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::settings::{Scope, Setup};
@@ -168,13 +168,13 @@ impl Raw {
                 spacing_mm: self.spacing.unwrap_or([1.0; 3]),
                 big_endian: self.endian == Some(Endian::Big),
             }),
-            (Some(_), ..) => Err(usage(format!("--dims: {} has dimensions of its own", printable(input)))),
+            (Some(_), ..) => Err(usage(format!("--dims: {} has dimensions of its own", shown_path(input)))),
             (None, _, VolumeSource::File(path)) => Ok(match &self.series {
                 Some(series) => VolumeSource::Series { path, series: series.clone() },
                 None => VolumeSource::File(path),
             }),
             (None, ..) if self.series.is_some() => {
-                Err(usage(format!("--series: {} has no DICOM series", printable(input))))
+                Err(usage(format!("--series: {} has no DICOM series", shown_path(input))))
             }
             (None, _, source) => Ok(source),
         }
@@ -189,7 +189,7 @@ impl Raw {
 /// Opens a volume and prints its warnings; errors name `input`, also where the library knows of no file.
 pub fn open(source: &VolumeSource, reading: Reading, input: &OsStr) -> Result<Volume> {
     let opened = match source.open(&reading) {
-        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input))?,
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| shown_path(input))?,
         other => other?,
     };
     opened.warnings.iter().for_each(|warning| crate::say(&format!("warning: {warning}")));
@@ -204,13 +204,13 @@ pub fn transfer(
     input: &OsStr,
 ) -> Result<TransferFunction> {
     let transfer = match loaded {
-        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| printable(input))?,
+        Err(error @ cao_formats::Error::Model(_)) => Err(error).with_context(|| shown_path(input))?,
         other => other?,
     };
     if volume.values.non_finite().is_some() {
         volume
             .hide_no_numbers(&transfer)
-            .with_context(|| format!("{}: --nan transparent", printable(input)))?;
+            .with_context(|| format!("{}: --nan transparent", shown_path(input)))?;
     }
     Ok(transfer)
 }

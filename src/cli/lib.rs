@@ -6,8 +6,8 @@ pub mod args;
 pub mod output;
 pub mod targets;
 
-use cao_formats::printable;
 use cao_model::error::shown;
+use cao_model::error::shown_path;
 use clap::{ArgMatches, Parser};
 use std::io::{ErrorKind, Write, stdout};
 use std::process::ExitCode;
@@ -32,7 +32,7 @@ pub fn parse<C: Parser>() -> Result<(C, ArgMatches), ExitCode> {
     parsed.map_err(|answer| {
         if answer.use_stderr() {
             // Clap shows words as they were typed.
-            match std::env::args_os().any(|word| printable(&word) != word.to_string_lossy()) {
+            match std::env::args_os().any(|word| shown_path(&word) != word.to_string_lossy()) {
                 true => say(&answer.render().to_string()),
                 false => drop(answer.print()),
             }

@@ -3,30 +3,31 @@
 use super::args::Global;
 use anyhow::{Context, Result};
 use cao::ambient::Categories;
-use cao_formats::printable;
 use cao_gpu::{Gpu, OpenOptions, Timings};
+use cao_model::error::shown_path;
 use cao_model::order::Layout;
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
-use std::ffi::OsStr;
 use std::io::Write;
 use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// Gathers the answer and prints it once.
+/// Gathers the answer and prints it once, or piece by piece as it comes.
 pub struct Out {
     as_json: bool,
     text: String,
+    /// Bytes of it that are printed already.
+    shown: usize,
     fields: Map<String, Value>,
 }
 
 impl Out {
     /// Nothing yet, in the form that the user chose.
     pub fn new(global: &Global) -> Self {
-        Self { as_json: global.json, text: String::new(), fields: Map::new() }
+        Self { as_json: global.json, text: String::new(), shown: 0, fields: Map::new() }
     }
 
     /// A line for people.
@@ -55,12 +56,12 @@ impl Out {
     }
 
     /// A volume's header, axes as its file has them.
-    pub fn volume(&mut self, name: impl AsRef<OsStr>, volume: &Volume) {
+    pub fn volume(&mut self, name: impl AsRef<Path>, volume: &Volume) {
         let Layout { dims, spacing, .. } = volume.stored_layout();
         let ([x, y, z], [sx, sy, sz]) = (dims, spacing);
         self.line(format!(
             "volume    {}: {x} x {y} x {z} voxels of {sx} x {sy} x {sz} mm, {}",
-            printable(&name),
+            shown_path(&name),
             volume.values.kind()
         ));
         self.json(json!({
@@ -123,7 +124,7 @@ impl Out {
 
     /// A file that was written.
     pub fn wrote(&mut self, path: &Path) {
-        self.line(format!("wrote     {}", printable(path)));
+        self.line(format!("wrote     {}", shown_path(path)));
         let files = self.fields.entry("files").or_insert_with(|| json!([]));
         if let Value::Array(files) = files {
             files.push(path.display().to_string().into());
@@ -140,17 +141,35 @@ impl Out {
         self.json(json!({ "stages_ms": stages }));
     }
 
-    /// Prints. A pipe whose reader has left is no failure.
+    /// Prints what was not yet shown. A pipe whose reader has left is no failure.
     ///
     /// # Errors
     /// Standard output cannot be written to.
-    pub fn finish(self) -> Result<()> {
-        let text = if self.as_json { format!("{:#}\n", Value::Object(self.fields)) } else { self.text };
-        let mut stdout = std::io::stdout();
-        match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-            other => other.context("cannot write to standard output"),
+    pub fn finish(mut self) -> Result<()> {
+        if self.as_json {
+            return print(&format!("{:#}\n", Value::Object(self.fields)));
         }
+        self.show()
+    }
+
+    /// Prints the lines since the last call, for people who wait for minutes; machines get one object at the end.
+    ///
+    /// # Errors
+    /// Standard output cannot be written to.
+    pub fn show(&mut self) -> Result<()> {
+        if !self.as_json {
+            print(&self.text[self.shown..])?;
+            self.shown = self.text.len();
+        }
+        Ok(())
+    }
+}
+
+fn print(text: &str) -> Result<()> {
+    let mut stdout = std::io::stdout();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("cannot write to standard output"),
     }
 }
 
@@ -215,6 +234,11 @@ impl Progress {
             self.bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         }
         self.bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
+    }
+
+    /// Does something that prints, without the bar in its way.
+    pub fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.bar.suspend(print)
     }
 
     fn end_stage(&mut self) {

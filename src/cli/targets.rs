@@ -3,7 +3,8 @@
 
 use super::args::usage;
 use anyhow::{Context, Result};
-use cao_formats::{Outputs, input, printable};
+use cao_formats::{Outputs, input};
+use cao_model::error::shown_path;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag::{register_conditional_default, register_usize};
 use signal_hook::low_level::emulate_default_handler;
@@ -26,7 +27,7 @@ impl Targets {
         let files: Vec<PathBuf> = files.into_iter().cloned().collect();
         let mut taken = Vec::new();
         for file in &files {
-            let shown = printable(file);
+            let shown = shown_path(file);
             if file.file_name().is_none() {
                 return Err(usage(format!("{shown}: expected the name of a file to write")));
             }
@@ -58,7 +59,7 @@ impl Targets {
             // Where a file can be written, a folder can.
             Some(outermost) => drop(Outputs::check(outermost)?),
             None if !folder.is_dir() => {
-                return Err(usage(format!("{}: is a file, expected a folder", printable(folder))));
+                return Err(usage(format!("{}: is a file, expected a folder", shown_path(folder))));
             }
             None => files.iter().try_for_each(|file| Outputs::check(file).map(drop))?,
         }
@@ -84,7 +85,7 @@ impl Targets {
     pub fn spare_inputs(&self) -> Result<()> {
         match self.files.iter().find(|file| input::was_read(file)) {
             Some(file) => {
-                Err(usage(format!("{}: would replace an input; expected another name", printable(file))))
+                Err(usage(format!("{}: would replace an input; expected another name", shown_path(file))))
             }
             None => Ok(()),
         }
@@ -127,7 +128,7 @@ impl Targets {
     fn make_folders(&self) -> Result<()> {
         let Some(folder) = self.folders.first() else { return Ok(()) };
         std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", printable(folder)))
+            .with_context(|| format!("cannot make the folder {}", shown_path(folder)))
     }
 }
 

@@ -1,7 +1,6 @@
 //! What can go wrong with a file, said so that the user knows what to do next.
 
 use cao_model::error::{MOST_NAMED, MOST_SAID, shown, shown_path};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Result with the crate's [`Error`].
@@ -97,9 +96,4 @@ impl Error {
 
 fn listed(choices: &[String]) -> String {
     choices.iter().map(|choice| format!("\n  {}", shown(choice, MOST_NAMED))).collect()
-}
-
-/// A name as a message shows it: without what would move the cursor of a terminal or begin a line of its own, and of bounded length.
-pub fn printable(name: impl AsRef<OsStr>) -> String {
-    shown_path(Path::new(name.as_ref()))
 }

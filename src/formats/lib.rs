@@ -33,7 +33,7 @@ pub mod transfer;
 pub mod volume;
 mod write;
 
-pub use error::{Error, Result, printable};
+pub use error::{Error, Result};
 pub use outputs::{Outputs, write_atomic};
 pub use picture::Picture;
 pub use raw::read_raw;

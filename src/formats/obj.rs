@@ -1,8 +1,8 @@
 //! Wavefront OBJ: the triangles of clip meshes.
 
-use crate::error::printable;
 use crate::{Result, file, polygon};
 use cao_model::error::quoted;
+use cao_model::error::shown_path;
 use cao_model::mesh::TriangleMesh;
 use glam::Vec3;
 use std::io::Cursor;
@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// [`Error::Io`](crate::Error::Io) when the file cannot be read, [`Error::File`](crate::Error::File) when it is longer than 256 MiB, [`cao_model::Error::Mesh`] naming the file
 /// (and the line where there is one) when it is not an OBJ file, has no faces, one that crosses itself, or coordinates that are not finite.
 pub fn load(path: &Path) -> Result<TriangleMesh> {
-    let name = printable(path);
+    let name = shown_path(path);
     let bytes = file::read_bytes(path, MAX_BYTES)?;
     parse(name, &String::from_utf8_lossy(&bytes))
 }

@@ -8,9 +8,9 @@ use std::fs::OpenOptions;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::printable;
 use crate::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
+use cao_model::error::shown_path;
 
 /// Files that are written together.
 #[derive(Debug)]
@@ -127,7 +127,7 @@ fn place(path: &Path) -> io::Result<PathBuf> {
             let name = path.file_name().ok_or_else(|| io::Error::other("is not the name of a file"))?;
             let folder = path.parent().filter(|folder| *folder != "").unwrap_or(Path::new("."));
             let real = folder.canonicalize().map_err(|error| match not_there(&error) {
-                true => io::Error::other(format!("there is no folder {}", printable(folder))),
+                true => io::Error::other(format!("there is no folder {}", shown_path(folder))),
                 false => error,
             })?;
             Ok(real.join(name))

@@ -3,9 +3,9 @@
 use std::io;
 use std::path::Path;
 
-use crate::error::printable;
 use crate::outputs::Outputs;
 use crate::{Error, Result};
+use cao_model::error::shown_path;
 use cao_model::order::Layout;
 use cao_model::volume::{IDENTITY, Space, Volume};
 
@@ -28,7 +28,7 @@ impl Outputs {
     pub fn nrrd(&mut self, path: &Path, like: &Volume, data: &[f32], content: &str) -> Result<()> {
         if data.len() != like.len() {
             let problem = format!("{} values, expected {} as the volume has voxels", data.len(), like.len());
-            return Err(Error::refused(&format!("values for {}", printable(path)), problem));
+            return Err(Error::refused(&format!("values for {}", shown_path(path)), problem));
         }
         self.write(path, |out| {
             out.write_all(header(like, content).as_bytes())?;

@@ -83,8 +83,8 @@ pub fn shown(text: &str, most: usize) -> String {
 }
 
 /// A file's name for a message, as [`shown`].
-pub fn shown_path(path: &Path) -> String {
-    shown(&path.to_string_lossy(), MOST_NAMED)
+pub fn shown_path(path: impl AsRef<Path>) -> String {
+    shown(&path.as_ref().to_string_lossy(), MOST_NAMED)
 }
 
 /// A value that was found, in quotes, cut to what fits a sentence.

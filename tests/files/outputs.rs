@@ -1,6 +1,7 @@
 //! Output files: all of them whole or none, under the names they were given; and which files were read.
 
-use cao_formats::{Outputs, input, printable};
+use cao_formats::{Outputs, input};
+use cao_model::error::shown_path;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -92,6 +93,6 @@ fn names_are_shown_without_what_a_terminal_would_obey() {
         ("a\u{1b}[2Jb", "a\\u{1b}[2Jb"),
         ("two\nlines\r\t\u{7f}\u{9b}", "two\\nlines\\r\\t\\u{7f}\\u{9b}"),
     ] {
-        assert_eq!(printable(name), shown);
+        assert_eq!(shown_path(name), shown);
     }
 }

@@ -3,10 +3,10 @@
 use anyhow::{Context, Result};
 pub use cao_cli::args::{Global, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
 use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
-use cao_formats::printable;
 use cao_measure::stability::Trial;
 use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
+use cao_model::error::shown_path;
 use cao_model::frame::Frame;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
@@ -384,7 +384,7 @@ pub fn clips(matches: &ArgMatches) -> Result<Vec<Clip>> {
 
     let mut clips = Vec::new();
     for name in values::<OsString>(matches, "clip") {
-        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {}", printable(&name)))?));
+        clips.push(Clip::remove(shape(&name).with_context(|| format!("--clip {}", shown_path(&name)))?));
     }
     for (clip, mode) in modes.into_iter().zip(values(matches, "clip_mode")) {
         clips[clip].mode = mode;

@@ -4,12 +4,12 @@ use crate::args::{self, Chart as Args, Global, usage};
 use anyhow::{Context, Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
-use cao_formats::printable;
 use cao_measure::chart;
 use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{Chart, Plan, Scene, csv, draw, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
+use cao_model::error::shown_path;
 use serde_json::json;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -29,7 +29,7 @@ const FILES: [&str; 4] = ["runs.csv", "chart.svg", "chart.png", "report.html"];
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
-        bail!("cannot write {}: there is no folder {}", printable(&args.output), printable(around));
+        bail!("cannot write {}: there is no folder {}", shown_path(&args.output), shown_path(around));
     }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
@@ -71,7 +71,7 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
 
 fn read_peers(path: &Path) -> Result<Peers> {
     let text = cao_formats::file::read_text(path)?;
-    Peers::parse(&text).with_context(|| printable(path))
+    Peers::parse(&text).with_context(|| shown_path(path))
 }
 
 /// The processor, which on a software driver is the device.
@@ -87,7 +87,7 @@ fn machine() -> String {
 fn command() -> String {
     let typed = std::env::args_os()
         .skip(1)
-        .map(printable)
+        .map(shown_path)
         .map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
     std::iter::once("cao".to_owned()).chain(typed).collect::<Vec<_>>().join(" ")
 }
@@ -111,7 +111,7 @@ fn scenes(args: &Args) -> Result<Vec<Scene>> {
     };
     for (i, name) in names.iter().enumerate() {
         if names[..i].contains(name) {
-            return Err(usage(format!("{}: is given twice; expected different scenes", printable(name))));
+            return Err(usage(format!("{}: is given twice; expected different scenes", shown_path(name))));
         }
     }
     names.iter().map(|name| scene(args, name, radius)).collect()
@@ -120,7 +120,7 @@ fn scenes(args: &Args) -> Result<Vec<Scene>> {
 fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
     let is_scene = args::has_extension(name, "toml");
     if let Some(flag) = args.raw.given().filter(|_| is_scene) {
-        return Err(usage(format!("{flag}: the scene {} says what its volume is", printable(name))));
+        return Err(usage(format!("{flag}: the scene {} says what its volume is", shown_path(name))));
     }
     let described = match is_scene {
         true => cao_formats::Scene::load(Path::new(name))?,
@@ -140,7 +140,7 @@ fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
     };
     let radius_mm = args.radius_mm.or(radius).unwrap_or(resolved.radius_mm);
     let rig = turn.rig(&described.stereo.rig(turn.extent(volume.size_mm())));
-    Ok(Scene { name: printable(name), volume, state: State { clips, transfer, radius_mm }, rig })
+    Ok(Scene { name: shown_path(name), volume, state: State { clips, transfer, radius_mm }, rig })
 }
 
 fn summary(out: &mut Out, chart: &Chart) {

@@ -7,7 +7,8 @@ use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_formats::scene::{Scene, Viewpoint};
-use cao_formats::{Outputs, Picture, printable};
+use cao_formats::{Outputs, Picture};
+use cao_model::error::shown_path;
 use cao_model::methods::Method;
 use clap::ArgMatches;
 use std::path::Path;
@@ -22,7 +23,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     progress.stage("reading");
     let is_scene = args::has_extension(&args.input, "toml");
     if let Some(flag) = args.raw.given().filter(|_| is_scene) {
-        let scene = printable(&args.input);
+        let scene = shown_path(&args.input);
         return Err(usage(format!("{flag}: the scene {scene} says what its volume is")));
     }
     let mut scene = match is_scene {

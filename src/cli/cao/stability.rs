@@ -4,8 +4,9 @@ use crate::args::{Global, Stability, usage};
 use anyhow::{Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
-use cao_formats::{Outputs, printable};
+use cao_formats::Outputs;
 use cao_measure::stability::{Effort, Finding, Ours, TRIALS, Trial, page};
+use cao_model::error::shown_path;
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -22,7 +23,7 @@ pub fn run(global: &Global, args: &Stability) -> Result<ExitCode> {
     }
     let folder = args.output.as_deref().ok_or_else(|| usage("-o DIR is missing: where to write"))?;
     if folder.exists() && !folder.is_dir() {
-        bail!("cannot write into {}: it is a file, expected a folder or a new name", printable(folder));
+        bail!("cannot write into {}: it is a file, expected a folder or a new name", shown_path(folder));
     }
     let trials = match args.only.is_empty() {
         true => TRIALS.to_vec(),

@@ -4,11 +4,11 @@ use crate::args::{self, Global, PROOF, Verified, Verify, setup};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
-use cao_formats::printable;
 use cao_gpu::Timings;
 use cao_measure::exactness::{Plan, Report, verify};
 use cao_model::METHODS;
 use cao_model::clip::Shape;
+use cao_model::error::shown_path;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use serde_json::json;
@@ -40,7 +40,7 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
         let transfer = args::transfer(transfer, &mut volume, name)?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
-        inputs.push((printable(name), volume, setups, transfer));
+        inputs.push((shown_path(name), volume, setups, transfer));
     }
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
@@ -60,6 +60,7 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
             print(&mut out, &input, setup.method, &report, args.seed);
             exact &= report.exact();
             vacuous |= report.vacuous();
+            progress.aside(|| out.show())?;
             reports.push(as_json(&input, setup.method, &report));
         }
     }

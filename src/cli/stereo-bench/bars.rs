@@ -17,12 +17,12 @@ use cao::field::transfer::TransferBuffer;
 use cao::host::read_values;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
-use cao_formats::printable;
 use cao_gpu::{Access, DeviceKind, Gpu, Phase, Stage};
 use cao_measure::error::errors;
 use cao_measure::random::Random;
 use cao_measure::reference::{Plan, ambient};
 use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::error::shown_path;
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -84,6 +84,32 @@ impl Row {
     }
 }
 
+/// The rows so far, each printed when it is measured: a run that is cut off was not in vain.
+struct Rows {
+    rows: Vec<Row>,
+    out: Out,
+    progress: Progress,
+}
+
+impl Rows {
+    fn push(&mut self, row: Row) -> Result<()> {
+        let range = |pick: fn(f64, f64) -> f64| row.found.iter().copied().reduce(pick).unwrap_or(f64::NAN);
+        let (low, high, found) = (range(f64::min), range(f64::max), median(&row.found));
+        let (verdict, bar) = match (row.bar, row.reached()) {
+            (Bar::None, _) => ("", String::new()),
+            (Bar::AtLeast(least), ok) => (if ok { "ok" } else { "MISSED" }, format!(", bar ≥ {least}")),
+            (Bar::AtMost(most), ok) => (if ok { "ok" } else { "MISSED" }, format!(", bar ≤ {most}")),
+        };
+        self.out.line(format!(
+            "{verdict:<6} {:<44} {:<34} {found:>9.4} {} [{low:.4} … {high:.4}]{bar}",
+            row.place, row.what, row.unit
+        ));
+        self.out.line(format!("       {}", row.note));
+        self.rows.push(row);
+        self.progress.aside(|| self.out.show())
+    }
+}
+
 /// A volume with the transfer function that the bars are for.
 struct Scene {
     name: String,
@@ -108,7 +134,7 @@ impl Scene {
 
     fn real(folder: &Path, name: &str, threshold: f32) -> Result<Self> {
         let path = folder.join("volumes").join(name);
-        let volume = cao_formats::open(&path).with_context(|| format!("--data {}", printable(folder)))?;
+        let volume = cao_formats::open(&path).with_context(|| format!("--data {}", shown_path(folder)))?;
         Self::new(name.split('_').next().unwrap_or(name), volume, threshold)
     }
 
@@ -359,7 +385,7 @@ fn absolute(
     scene: &Scene,
     radius_voxels: f32,
     (rule, full_ms, moved_ms): Milliseconds,
-    rows: &mut Vec<Row>,
+    rows: &mut Rows,
 ) -> Result<()> {
     let judged = gpu.info().kind != DeviceKind::Cpu;
     let at_most = |ms: f64| if judged && ms.is_finite() { Bar::AtMost(ms) } else { Bar::None };
@@ -378,7 +404,7 @@ fn absolute(
     };
     let (moved, placed) = (to_and_fro([here, beside])?, to_and_fro([here, elsewhere])?);
     let place = format!("{}, R = {radius_voxels}, {}", scene.name, rule.name());
-    let mut row = |what: &str, times: &[Time], of: fn(&Time) -> f64, bar: Bar| {
+    let mut row = |what: &str, times: &[Time], of: fn(&Time) -> f64, bar: Bar| -> Result<()> {
         let clock = median(&times.iter().map(|t| t.clock).collect::<Vec<_>>());
         rows.push(Row {
             place: place.clone(),
@@ -387,13 +413,12 @@ fn absolute(
             unit: "ms",
             found: times.iter().map(of).collect(),
             note: format!("by the clock {clock:.2} ms"),
-        });
+        })
     };
-    row("full update", &full, |t| t.device, at_most(full_ms));
-    row("sphere moved 1 voxel", &moved, |t| t.device, at_most(moved_ms));
-    row("sphere at a new place", &placed, |t| t.device, Bar::None);
-    row("sphere moved, clock less device", &moved, |t| t.clock - t.device, at_most(0.5));
-    Ok(())
+    row("full update", &full, |t| t.device, at_most(full_ms))?;
+    row("sphere moved 1 voxel", &moved, |t| t.device, at_most(moved_ms))?;
+    row("sphere at a new place", &placed, |t| t.device, Bar::None)?;
+    row("sphere moved, clock less device", &moved, |t| t.clock - t.device, at_most(0.5))
 }
 
 /// Device memory at its peak with a full update, bytes a voxel, in a device of its own.
@@ -450,7 +475,12 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     let gpu = open_gpu(&cli.global)?;
     let software = gpu.info().kind == DeviceKind::Cpu;
     progress.stage("measuring");
-    let mut rows = Vec::new();
+    let mut out = Out::new(&cli.global);
+    out.device(&gpu);
+    let machine = machine::describe();
+    out.line(format!("machine   {machine}"));
+    out.line(format!("medians of {RUNS} runs in one process, warmed up, lowest and highest in brackets"));
+    let mut rows = Rows { rows: Vec::new(), out, progress };
     // The most telling first: the same rows small on a software driver.
     let (size, radius, pixels) = if software { (64, 12.0, [256, 276]) } else { (512, 50.0, [2064, 2208]) };
     let scenes = [
@@ -462,60 +492,41 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
         for rule in rules {
             absolute(&gpu, &scene, radius, rule, &mut rows)?;
         }
-        progress.set(0.1 * rows.len() as f64 / 4.0);
+        rows.progress.set(0.1 * rows.rows.len() as f64 / 4.0);
         if name == "engine" {
-            rows.push(against_lao(&gpu, &scene, radius, Bar::None)?);
-            rows.push(memory(cli, &scene, radius)?);
-            rows.push(picture(&gpu, &scene, pixels)?);
+            rows.push(against_lao(&gpu, &scene, radius, Bar::None)?)?;
+            rows.push(memory(cli, &scene, radius)?)?;
+            rows.push(picture(&gpu, &scene, pixels)?)?;
         }
     }
-    progress.set(0.5);
+    rows.progress.set(0.5);
     if let (Some(engine), Some(torso)) = (&engine, &torso) {
-        rows.push(error(&gpu, engine, 20.0, RaySet::Spiral(50), Bar::AtMost(0.0055))?);
-        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(50), Bar::AtMost(0.014))?);
-        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(192), Bar::AtMost(0.0062))?);
+        rows.push(error(&gpu, engine, 20.0, RaySet::Spiral(50), Bar::AtMost(0.0055))?)?;
+        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(50), Bar::AtMost(0.014))?)?;
+        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(192), Bar::AtMost(0.0062))?)?;
         // These bars are a software driver's; a GPU has milliseconds.
         let at_least = |ratio: f64| if software { Bar::AtLeast(ratio) } else { Bar::None };
-        rows.push(against_lao(&gpu, engine, 20.0, at_least(12.0))?);
-        rows.push(against_lao(&gpu, torso, 50.0, at_least(40.0))?);
+        rows.push(against_lao(&gpu, engine, 20.0, at_least(12.0))?)?;
+        rows.push(against_lao(&gpu, torso, 50.0, at_least(40.0))?)?;
         let from = Vec3::new(20.0, -30.0, 10.0);
-        rows.push(clip_ratio(&gpu, engine, [from, from + Vec3::X], "moved 1 voxel", at_least(2.5))?);
+        rows.push(clip_ratio(&gpu, engine, [from, from + Vec3::X], "moved 1 voxel", at_least(2.5))?)?;
         let to = Vec3::new(-35.0, 25.0, 0.0);
-        rows.push(clip_ratio(&gpu, engine, [from, to], "at a new place", at_least(1.5))?);
+        rows.push(clip_ratio(&gpu, engine, [from, to], "at a new place", at_least(1.5))?)?;
     }
-    progress.set(0.9);
+    rows.progress.set(0.9);
     if !software && cli.large {
         let scene = Scene::built_in("engine", 1024, 60.0)?;
         absolute(&gpu, &scene, radius, (Quadrature::Hybrid, f64::INFINITY, f64::INFINITY), &mut rows)?;
-        rows.push(memory(cli, &scene, radius)?);
+        rows.push(memory(cli, &scene, radius)?)?;
     }
     check_validation(&gpu)?;
-    drop(progress);
-    print(cli, &gpu, &rows, software)
+    end(cli, rows, &machine, software)
 }
 
-fn print(cli: &Cli, gpu: &Gpu, rows: &[Row], software: bool) -> Result<ExitCode> {
-    let mut out = Out::new(&cli.global);
-    out.device(gpu);
-    let machine = machine::describe();
-    out.line(format!("machine   {machine}"));
-    out.line(format!("medians of {RUNS} runs in one process, warmed up, lowest and highest in brackets"));
-    let mut reached = true;
-    for row in rows {
-        let range = |pick: fn(f64, f64) -> f64| row.found.iter().copied().reduce(pick).unwrap_or(f64::NAN);
-        let (low, high, found) = (range(f64::min), range(f64::max), median(&row.found));
-        reached &= row.reached();
-        let (verdict, bar) = match (row.bar, row.reached()) {
-            (Bar::None, _) => ("", String::new()),
-            (Bar::AtLeast(least), ok) => (if ok { "ok" } else { "MISSED" }, format!(", bar ≥ {least}")),
-            (Bar::AtMost(most), ok) => (if ok { "ok" } else { "MISSED" }, format!(", bar ≤ {most}")),
-        };
-        out.line(format!(
-            "{verdict:<6} {:<44} {:<34} {found:>9.4} {} [{low:.4} … {high:.4}]{bar}",
-            row.place, row.what, row.unit
-        ));
-        out.line(format!("       {}", row.note));
-    }
+fn end(cli: &Cli, rows: Rows, machine: &str, software: bool) -> Result<ExitCode> {
+    let Rows { rows, mut out, progress } = rows;
+    drop(progress);
+    let reached = rows.iter().all(Row::reached);
     if cli.data.is_none() {
         out.line("not measured: the real volumes; give their folder by --data");
     }

@@ -3,8 +3,8 @@
 use super::machine;
 use anyhow::Result;
 use cao_cli::targets::Targets;
-use cao_formats::printable;
 use cao_gpu::Gpu;
+use cao_model::error::shown_path;
 use std::path::Path;
 
 /// The run's own folder in `parent`: `<date>-<device>`, with a number where that is taken; and the files in it.
@@ -55,7 +55,7 @@ fn command() -> String {
         let value = std::env::var(key).ok().filter(|value| !value.is_empty())?;
         Some(format!("{key}={}", quoted(&value)))
     });
-    let arguments = std::env::args_os().skip(1).map(|argument| quoted(&printable(argument)));
+    let arguments = std::env::args_os().skip(1).map(|argument| quoted(&shown_path(argument)));
     environment.chain(["stereo-bench".into()]).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 

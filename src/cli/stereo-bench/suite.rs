@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 use cao_cli::args::{self, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
-use cao_formats::printable;
 use cao_gpu::DeviceKind;
+use cao_model::error::shown_path;
 use cao_model::methods::Method;
 use serde_json::{Map, json};
 use std::ffi::OsStr;
@@ -93,7 +93,7 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
     out.line(format!("views     {views} of {} x {} pixels, in one dispatch", size[0], size[1]));
-    out.line(format!("clip      {}", printable(&cli.clip)));
+    out.line(format!("clip      {}", shown_path(&cli.clip)));
     out.line(match cli.all_voxels {
         true => "voxels    all",
         false => "voxels    those that a sample with opacity can touch",
@@ -154,7 +154,7 @@ fn plan(cli: &Cli) -> Result<Plan> {
     }
     let clip = match cli.clip == "none" {
         true => None,
-        false => Some(shape(&cli.clip).with_context(|| format!("--clip {}", printable(&cli.clip)))?),
+        false => Some(shape(&cli.clip).with_context(|| format!("--clip {}", shown_path(&cli.clip)))?),
     };
     let methods = cli.methods.clone();
     Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up })
@@ -167,6 +167,6 @@ fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range());
     let transfer = args::transfer(transfer, &mut volume, &cli.input)?;
-    let input = Rc::new(Input { name: printable(&cli.input), volume, transfer });
+    let input = Rc::new(Input { name: shown_path(&cli.input), volume, transfer });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }
