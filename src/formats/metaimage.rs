@@ -265,7 +265,7 @@ impl<'a> Header<'a> {
         {
             let have = meta.len().saturating_sub(parts.start);
             let problem =
-                format!("{size} bytes, but {} holds {have} for {count} values", shown_path(&parts.path(0)));
+                format!("{size} bytes, but {} holds {have} for {count} values", shown_path(parts.path(0)));
             return Err(bad(path, "CompressedDataSize", problem));
         }
         Ok(Payload { kind, endian, encoding, skip, parts, frame, exact: false })
