@@ -8,6 +8,7 @@
 use std::path::Path;
 
 use crate::Result;
+use crate::binary::Binary;
 use crate::grid::Grid;
 use crate::nifti::{has_extension, partner, start_of};
 use crate::parts::Parts;
@@ -20,14 +21,14 @@ use cao_model::volume::{check_spacing, voxel_count};
 const HEADER: usize = 348;
 
 /// The header of such a file, and the order of its bytes.
-fn parse(bytes: &[u8]) -> Option<(Header<'_>, i64)> {
+fn parse(bytes: &[u8]) -> Option<(Binary<&[u8; HEADER]>, i64)> {
     let bytes = bytes.first_chunk::<HEADER>()?;
     let mark = &bytes[344..348];
     if matches!(mark, [b'n', b'i' | b'+', b'1', 0]) {
         return None;
     }
     [Endian::Little, Endian::Big].into_iter().find_map(|endian| {
-        let header = Header { bytes, endian };
+        let header = Binary { bytes, endian };
         let rank = header.i16(40);
         (header.i32(0) == HEADER as i64 && (1..=7).contains(&rank)).then_some((header, rank))
     })
@@ -60,7 +61,7 @@ pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     }
     let size = [1, 2, 3].map(|i| u64::try_from(dim(i)).unwrap_or(0));
     let count = voxel_count(size).map_err(|p| bad(path, "dim", p))?;
-    let spacing = [1, 2, 3].map(|i| header.real(76 + 4 * i).abs());
+    let spacing = [1, 2, 3].map(|i| header.f32(76 + 4 * i).abs());
     check_spacing(spacing).map_err(|p| bad(path, "pixdim", p))?;
     let kind = match header.i16(70) {
         2 => Kind::U8,
@@ -76,11 +77,11 @@ pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
             return Err(bad(path, "datatype", problem));
         }
     };
-    let offset = header.real(108);
+    let offset = header.f32(108);
     if !((0.0..9e15).contains(&offset) && offset.fract() == 0.0) {
         return Err(bad(path, "vox_offset", format!("{offset}, expected a whole number of bytes")));
     }
-    let (slope, intercept) = (header.real(112), header.real(116));
+    let (slope, intercept) = (header.f32(112), header.f32(116));
     let scale = if slope != 0.0 && slope.is_finite() {
         (slope, if intercept.is_finite() { intercept } else { 0.0 })
     } else {
@@ -100,32 +101,4 @@ pub(crate) fn read(path: &Path, reading: &Reading) -> Result<Opened> {
     let values = payload.read(path, "data", count, &mut warnings)?;
     let dims = size.map(|d| d as usize);
     assemble(path, Found { dims, grid: Grid::plain(spacing), values, scale, warnings }, reading)
-}
-
-struct Header<'a> {
-    bytes: &'a [u8; HEADER],
-    endian: Endian,
-}
-
-impl Header<'_> {
-    /// Bytes at an offset of the format in little-endian order.
-    fn at<const N: usize>(&self, offset: usize) -> [u8; N] {
-        let mut bytes: [u8; N] = std::array::from_fn(|i| self.bytes[offset + i]);
-        if self.endian == Endian::Big {
-            bytes.reverse();
-        }
-        bytes
-    }
-
-    fn i16(&self, offset: usize) -> i64 {
-        i16::from_le_bytes(self.at(offset)).into()
-    }
-
-    fn i32(&self, offset: usize) -> i64 {
-        i32::from_le_bytes(self.at(offset)).into()
-    }
-
-    fn real(&self, offset: usize) -> f64 {
-        f32::from_le_bytes(self.at(offset)).into()
-    }
 }

@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 mod analyze;
+mod binary;
 #[cfg(feature = "dicom")]
 mod dicom;
 pub mod error;

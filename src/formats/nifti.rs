@@ -7,6 +7,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::binary::Binary;
 use crate::grid::{self, Grid};
 use crate::parts::Parts;
 use crate::payload::{Encoding, Payload, Skip};
@@ -96,8 +97,7 @@ pub(crate) fn start_of(path: &Path) -> Result<(Vec<u8>, bool)> {
 
 struct Header<'a> {
     path: &'a Path,
-    bytes: Vec<u8>,
-    endian: Endian,
+    numbers: Binary<Vec<u8>>,
     /// Version 2 rather than 1.
     second: bool,
     /// The data are in a file of their own.
@@ -132,38 +132,25 @@ impl<'a> Header<'a> {
                 return Err(bad(path, "magic", format!("{}, expected {expected}", quoted(&found))));
             }
         };
-        Ok(Header { path, bytes, endian, second, pair })
-    }
-
-    /// Bytes at an offset in native order. Offsets are those of the format, within the length that `parse` checked.
-    fn at<const N: usize>(&self, offset: usize) -> [u8; N] {
-        let mut bytes: [u8; N] = std::array::from_fn(|i| self.bytes[offset + i]);
-        if self.endian == Endian::Big {
-            bytes.reverse();
-        }
-        bytes
-    }
-
-    fn i16(&self, offset: usize) -> i64 {
-        i16::from_le_bytes(self.at(offset)).into()
-    }
-
-    fn i32(&self, offset: usize) -> i64 {
-        i32::from_le_bytes(self.at(offset)).into()
+        Ok(Header { path, numbers: Binary { bytes, endian }, second, pair })
     }
 
     /// Floating-point number `i` of a field: 32 bits in version 1, 64 in version 2.
     fn real(&self, offsets: (usize, usize), i: usize) -> f64 {
         if self.second {
-            f64::from_le_bytes(self.at(offsets.1 + 8 * i))
+            f64::from_le_bytes(self.numbers.at(offsets.1 + 8 * i))
         } else {
-            f32::from_le_bytes(self.at(offsets.0 + 4 * i)).into()
+            self.numbers.f32(offsets.0 + 4 * i)
         }
     }
 
     /// Entry `i` of `dim`, of which the first is their number.
     fn dim(&self, i: usize) -> i64 {
-        if self.second { i64::from_le_bytes(self.at(16 + 8 * i)) } else { self.i16(40 + 2 * i) }
+        if self.second {
+            i64::from_le_bytes(self.numbers.at(16 + 8 * i))
+        } else {
+            self.numbers.i16(40 + 2 * i)
+        }
     }
 
     fn dims(&self) -> Result<[u64; 3]> {
@@ -198,7 +185,7 @@ impl<'a> Header<'a> {
 
     fn grid(&self) -> Result<Grid> {
         let path = self.path;
-        let units = if self.second { self.i32(500) } else { self.bytes[123].into() };
+        let units = if self.second { self.numbers.i32(500) } else { self.numbers.bytes[123].into() };
         // The low three bits are the unit of space.
         let unit = match units & 7 {
             0 | 2 => 1.0,
@@ -216,8 +203,11 @@ impl<'a> Header<'a> {
         // Some writers put the direction into the sign; where the format looks for it is the qform and sform.
         let grid = Grid::plain([1, 2, 3].map(|i| pixdim(i).abs()));
         check_spacing(grid.spacing.map(|s| s * unit)).map_err(|p| bad(path, "pixdim", p))?;
-        let (qform, sform) =
-            if self.second { (self.i32(344), self.i32(348)) } else { (self.i16(252), self.i16(254)) };
+        let (qform, sform) = if self.second {
+            (self.numbers.i32(344), self.numbers.i32(348))
+        } else {
+            (self.numbers.i16(252), self.numbers.i16(254))
+        };
         // Some writers announce an sform and leave its place empty.
         let blank = (0..3).all(|i| self.srow(i) == [0.0; 3]);
         let mut grid = match (sform > 0 && !(blank && qform > 0), qform > 0) {
@@ -292,7 +282,7 @@ impl<'a> Header<'a> {
 
     fn payload(&self, compressed: bool, frame: Frame) -> Result<Payload> {
         let path = self.path;
-        let code = self.i16(if self.second { 12 } else { 70 });
+        let code = self.numbers.i16(if self.second { 12 } else { 70 });
         let kind = match code {
             2 => Kind::U8,
             4 => Kind::I16,
@@ -313,8 +303,11 @@ impl<'a> Header<'a> {
         let header = if self.second { HEADER_2 } else { HEADER_1 };
         // 0 was written for `where the header ends`, with its four bytes that announce extensions.
         let implied = if self.pair { 0 } else { header as u64 + 4 };
-        let offset =
-            if self.second { i64::from_le_bytes(self.at(168)) as f64 } else { self.real((108, 0), 0) };
+        let offset = if self.second {
+            i64::from_le_bytes(self.numbers.at(168)) as f64
+        } else {
+            self.real((108, 0), 0)
+        };
         let least = if self.pair { 0 } else { header };
         let offset = match offset {
             0.0 => implied,
@@ -341,6 +334,6 @@ impl<'a> Header<'a> {
             (Encoding::Raw, Skip::NOTHING, offset)
         };
         let parts = Parts::one(data, start);
-        Ok(Payload { kind, endian: self.endian, encoding, skip, parts, frame, exact: false })
+        Ok(Payload { kind, endian: self.numbers.endian, encoding, skip, parts, frame, exact: false })
     }
 }

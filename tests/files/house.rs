@@ -238,6 +238,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
     ("src/formats/scene.rs", &["error", "file", "obj", "reading", "toml_value", "transfer"]),
     // The readers of volumes, and what refuses and assembles for all of them.
+    ("src/formats/binary.rs", &[]),
     ("src/formats/gzip.rs", &[]),
     ("src/formats/memory.rs", &[]),
     ("src/formats/parts.rs", &[]),
@@ -246,13 +247,16 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/text.rs", &["error", "file", "parts", "volume"]),
     ("src/formats/raw.rs", &["error", "grid", "parts", "payload", "reading", "volume"]),
     ("src/formats/nrrd.rs", &["error", "grid", "parts", "payload", "reading", "text", "volume"]),
-    ("src/formats/nifti.rs", &["error", "file", "grid", "parts", "payload", "reading", "volume"]),
+    ("src/formats/nifti.rs", &["binary", "error", "file", "grid", "parts", "payload", "reading", "volume"]),
     ("src/formats/metaimage.rs", &["error", "grid", "parts", "payload", "reading", "text", "volume"]),
-    ("src/formats/analyze.rs", &["error", "grid", "nifti", "parts", "payload", "reading", "volume"]),
+    (
+        "src/formats/analyze.rs",
+        &["binary", "error", "grid", "nifti", "parts", "payload", "reading", "volume"],
+    ),
     ("src/formats/listing.rs", &["error", "file", "volume"]),
     ("src/formats/foreign.rs", &[]),
     ("src/formats/tiff_stack.rs", &["error", "file", "grid", "reading", "volume"]),
-    ("src/formats/dicom/", &["error", "file", "grid", "listing", "reading", "volume"]),
+    ("src/formats/dicom/", &["binary", "error", "file", "grid", "listing", "reading", "volume"]),
     (
         "src/formats/volume.rs",
         &[

@@ -6,6 +6,7 @@
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use crate::binary::ordered;
 use crate::volume::bad;
 use crate::{Error, Result, file};
 use cao_model::values::Endian;
@@ -424,12 +425,4 @@ pub(super) fn name(tag: Tag) -> String {
 /// Text of a value: names and identifiers only, so what is not ASCII does not matter.
 fn text(value: &[u8]) -> String {
     String::from_utf8_lossy(value).trim_matches(|c: char| c == '\0' || c.is_whitespace()).to_owned()
-}
-
-/// Bytes in little-endian order.
-fn ordered<const N: usize>(mut bytes: [u8; N], endian: Endian) -> [u8; N] {
-    if endian == Endian::Big {
-        bytes.reverse();
-    }
-    bytes
 }
