@@ -44,9 +44,6 @@ const TILE = 8u;
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
 const LEAP_MARGIN = 0.1;
 
-// Below this gradient of opacity per smallest spacing there is no surface.
-const FLAT = 1e-4;
-
 // Halvings of a step at a cut: to 1/16 of it.
 const CUT_HALVINGS = 4u;
 
@@ -84,25 +81,7 @@ fn value_at(position: vec3<f32>) -> f32 {
     return texel * frame.scale + frame.bias;
 }
 
-fn opacity_at(position: vec3<f32>) -> f32 {
-    return textureSampleLevel(opacity, field, (position + 0.5) / frame.dims.xyz, 0.0).r;
-}
-
-// Lambert's term of a surface seen from either side, from the gradient of the clipped opacity, so that cut faces are shaded
-// as surfaces. Where there is no gradient there is no surface, and the term is 1.
-fn surface_light(position: vec3<f32>) -> f32 {
-    let voxel = frame.spacing.xyz / min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
-    let gradient = vec3(
-        opacity_at(position + vec3(1.0, 0.0, 0.0)) - opacity_at(position - vec3(1.0, 0.0, 0.0)),
-        opacity_at(position + vec3(0.0, 1.0, 0.0)) - opacity_at(position - vec3(0.0, 1.0, 0.0)),
-        opacity_at(position + vec3(0.0, 0.0, 1.0)) - opacity_at(position - vec3(0.0, 0.0, 1.0)),
-    ) / (2.0 * voxel);
-    let steepness = length(gradient);
-    if steepness < FLAT {
-        return 1.0;
-    }
-    return abs(dot(gradient, frame.light.xyz)) / steepness;
-}
+#include "shared/shading.wgsl"
 
 // Whether nothing that lies further along the ray can change a pixel of the picture by more than the frame's tolerance. What
 // remains adds at most its share of the brightest light to a component, or takes as much of a background; sRGB coding
@@ -124,9 +103,6 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let along = ray.along;
 
     let exponent = frame.spacing.w / frame.light.w;
-    // Interleaved gradient noise (Jimenez 2014) against banding.
-    let noise = fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
-    let phase = select(0.5, noise, frame.jitter > 0.0);
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
     let last_brick = vec3<i32>(bricks) - 1;
 
@@ -139,7 +115,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     // The sample at which the last leap over something hidden ended.
     var landed = 0xffffffffu;
     loop {
-        let t = ray.begin + (f32(k) + phase) * ray.step;
+        let t = ray.begin + (f32(k) + 0.5) * ray.step;
         if !(t < ray.end) {
             break;
         }
@@ -159,7 +135,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
             let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
             let t_out = min(out.x, min(out.y, out.z));
-            let first = ceil((t_out - ray.begin) / ray.step - phase - LEAP_MARGIN);
+            let first = ceil((t_out - ray.begin) / ray.step - 0.5 - LEAP_MARGIN);
             k = max(k + 1u, u32(clamp(first, 0.0, 1e9)));
             if to_opacity < leap {
                 // What a clip hides is among what is leapt over: the last sample of it may be the one before a cut.
@@ -197,9 +173,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             a = opacity_of(value);
         }
         let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
-        let light = frame.ambient + frame.diffuse * surface_light(shown);
-        let shade = light * mix(1.0, frame.gain * ambient_at(shown), frame.occluded);
-        colour += (1.0 - alpha) * covered * shade * colour_of(value);
+        colour += (1.0 - alpha) * covered * shaded(shown, value);
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;

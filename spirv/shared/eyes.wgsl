@@ -36,8 +36,6 @@ struct Frame {
     scale: f32,
     // 1: ambient occlusion is shown, 0: solid colour
     occluded: f32,
-    // 1: samples start at a different fraction of a step in every pixel
-    jitter: f32,
     // the ambient factor is shown times this
     gain: f32,
 }

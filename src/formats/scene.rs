@@ -53,7 +53,6 @@
 //!     diffuse = 0.6                    # light that depends on the gradient
 //!     light = [-0.4, -0.7, 0.6]        # direction towards it
 //!     occlusion = true                 # false: the picture without ambient occlusion
-//!     jitter = true                    # against banding
 //!     "##,
 //!     std::path::Path::new("."),
 //! )?;
@@ -481,7 +480,6 @@ struct ShadingFile {
     diffuse: Option<f64>,
     light: Option<[f64; 3]>,
     occlusion: Option<bool>,
-    jitter: Option<bool>,
 }
 
 fn volume(value: Value, base: &Path) -> Result<(VolumeSource, Reading)> {
@@ -778,7 +776,6 @@ impl ShadingFile {
             diffuse: self.diffuse.map_or(default.diffuse, |share| share as f32),
             light,
             occluded: self.occlusion.unwrap_or(default.occluded),
-            jitter: self.jitter.unwrap_or(default.jitter),
             ..default
         })
     }

@@ -21,8 +21,6 @@ pub struct Look {
     /// The ambient factor is shown times this. A flat wall's is 1/2, so that 2 shows it at full light; the paper's authors do
     /// the same.
     pub gain: f32,
-    /// Whether samples start at another fraction of a step in every pixel, against banding.
-    pub jitter: bool,
     /// Whether the ambient factor is shown; without it the picture is the paper's "solid colour".
     pub occluded: bool,
 }
@@ -36,7 +34,6 @@ impl Default for Look {
             step_mm: None,
             tolerance: 0.5,
             gain: 2.0,
-            jitter: true,
             occluded: true,
         }
     }

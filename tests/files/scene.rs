@@ -104,7 +104,7 @@ fn every_setting_arrives() {
          [stereo]\nposition_mm = [0, -100, 0]\ntarget_mm = [0, 10, 0]\nup = [1, 0, 0]\nipd_mm = 0\nfov_deg = 60\n\
          screen_mm = 50\n\
          [image]\nwidth = 320\nheight = 200\nstep_mm = 0.5\nbackground = [1, 1, 1]\n\
-         [shading]\nambient = 1\ndiffuse = 0\nlight = [0, 0, 2]\nocclusion = false\njitter = false",
+         [shading]\nambient = 1\ndiffuse = 0\nlight = [0, 0, 2]\nocclusion = false",
     );
     assert_eq!(scene.transfer, TransferSource::Preset("mr".into()));
     let o = scene.occlusion.setup(1.0).unwrap().occlusion;
@@ -117,7 +117,7 @@ fn every_setting_arrives() {
     assert_eq!((scene.image.width, scene.image.height, scene.look.step_mm), (320, 200, Some(0.5)));
     assert_eq!(scene.image.background, [1.0; 3]);
     let s = scene.look;
-    assert_eq!((s.ambient, s.diffuse, s.light, s.occluded, s.jitter), (1.0, 0.0, Vec3::Z, false, false));
+    assert_eq!((s.ambient, s.diffuse, s.light, s.occluded), (1.0, 0.0, Vec3::Z, false));
     // A number names a ray set as its text does.
     assert_eq!(with("[occlusion]\nrays = 54").occlusion.rays, RaySet::R54);
 }

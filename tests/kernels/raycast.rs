@@ -190,12 +190,7 @@ fn pictures_are_those_of_the_twin() {
         renderer.set_clips(&clips).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         for turn in 0..3 {
-            let look = Look {
-                step_mm: Some([0.5, 0.35, 0.8][turn]),
-                jitter: turn != 0,
-                occluded: turn != 2,
-                ..Look::default()
-            };
+            let look = Look { step_mm: Some([0.5, 0.35, 0.8][turn]), occluded: turn != 2, ..Look::default() };
             let views = framing(&volume, -30.0 + 70.0 * (turn + n) as f32, 35.0 - 20.0 * turn as f32);
             let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
             let expected = twin(&renderer, &volume, &transfer, &clips, &views, &look);
@@ -290,11 +285,9 @@ fn no_pixel_is_ever_nan() {
                 for orientation in [Quat::IDENTITY, Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)] {
                     let view = View { position, orientation, tan: even, near_mm, far_mm: 100.0 };
                     let views = [view, View { position: position + Vec3::X, ..view }];
-                    for jitter in [false, true] {
-                        let look = Look { step_mm: Some(0.7), jitter, ..Look::default() };
-                        let (found, _) = renderer.draw(&views, &look, [15, 13]).unwrap();
-                        assert_finite(&found, &format!("{dims:?} {view:?}"));
-                    }
+                    let look = Look { step_mm: Some(0.7), ..Look::default() };
+                    let (found, _) = renderer.draw(&views, &look, [15, 13]).unwrap();
+                    assert_finite(&found, &format!("{dims:?} {view:?}"));
                 }
             }
         }
@@ -599,12 +592,12 @@ fn leaping_over_empty_and_clipped_space_changes_no_bit() {
         let every_sample = vec![NO_LEAP; words.len()];
         let mut shown = 0;
         for (n, views) in pairs_of_views(&mut random, &volume).iter().enumerate() {
-            for (jitter, step) in [(false, 0.5), (true, 0.31), (true, 0.95)] {
-                let look = Look { jitter, step_mm: Some(step), ..Look::default() };
+            for step in [0.5, 0.31, 0.95] {
+                let look = Look { step_mm: Some(step), ..Look::default() };
                 let leapt = stages.draw(&gpu, views, &look, &words);
                 let every = stages.draw(&gpu, views, &look, &every_sample);
                 let differ = differing(&leapt, &every);
-                assert_eq!(differ, 0, "{name} seed {SEED} views {n} jitter {jitter}: {:?}", views[0]);
+                assert_eq!(differ, 0, "{name} seed {SEED} views {n}: {:?}", views[0]);
                 shown += every[..2].iter().flatten().filter(|&&byte| byte != 0).count();
             }
         }

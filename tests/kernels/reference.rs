@@ -217,7 +217,7 @@ impl Scene {
             ambient,
             clips: &[],
             step_mm,
-            look: Look { ambient: 0.3, diffuse: 0.3, light, jitter: false, ..Look::default() },
+            look: Look { ambient: 0.3, diffuse: 0.3, light, ..Look::default() },
         }
     }
 

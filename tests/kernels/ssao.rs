@@ -45,7 +45,7 @@ fn on_device(gpu: &Gpu, settings: Settings, azimuth: f32) -> ([View; 2], [Vec<f3
         rec.discard(&colour);
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        let look = Look { jitter: false, ..Look::default() };
+        let look = Look::default();
         renderer.record_draw(rec, &views, &look, &colour, &depth, SIZE).unwrap();
         rec.barrier(&[Access::AttachmentWrite], &[Access::SampledRead, Access::TransferRead]);
         let Settings { radius_mm, samples, bias_mm } = settings;

@@ -208,7 +208,7 @@ fn image_space_occlusion_fails_the_check_that_data_space_passes() {
         renderer.set_clips(&[Clip { shape: Shape::Sphere, mode: Mode::Remove, pose }]).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let views = eyes(&volume, azimuth);
-        let look = Look { jitter: false, ..Look::default() };
+        let look = Look::default();
         let (picture, _) = renderer.draw(&views, &look, SIZE.map(|s| s as u32)).unwrap();
 
         // Voxel centres within a voxel of the surface that each eye's picture shows at their place.

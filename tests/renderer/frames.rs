@@ -32,7 +32,7 @@ impl Window {
             depth: target(Format::D32Float),
             back: gpu.buffer("back", u64::from(SIZE[0] * SIZE[1]) * 16, BufferUse::Readback).unwrap(),
             views: eyes(&scene.volume, 30.0),
-            look: Look { jitter: false, ..Look::default() },
+            look: Look::default(),
         }
     }
 

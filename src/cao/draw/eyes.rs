@@ -97,7 +97,6 @@ impl FrameBuffer {
         data.scale = field.scale;
         data.occluded = f32::from(u8::from(look.occluded));
         data.gain = look.gain;
-        data.jitter = f32::from(u8::from(look.jitter));
         rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);

@@ -209,7 +209,7 @@ pub struct Entrant {
 
 /// How a frame is drawn whose depth stands for the surface: without noise, so that it is the same each time.
 pub fn surface_look() -> Look {
-    Look { jitter: false, occluded: false, ..Look::default() }
+    Look { occluded: false, ..Look::default() }
 }
 
 /// What opens a contender.

@@ -180,7 +180,7 @@ fn pictures(
         ambient,
         clips: &clips,
         step_mm: 1.0 / f64::from(truth::Plan::QUICK.steps_per_voxel),
-        look: Look { jitter: false, ..Look::default() },
+        look: Look::default(),
     };
     let ([view, _], size) = (cut.views()?, [plan.pixels; 2]);
     let radius = f64::from(RADIUS);

@@ -175,7 +175,7 @@ fn shown(cut: &mut PlaneCut, way: f64, pixels: u32) -> Result<Frame> {
     let ambient = cut.renderer.read_ambient()?;
     let at_face = |&[y, z]: &[f64; 2]| trilinear_clamped(&cut.grid, &ambient, [x, y, z]);
     let views = cut.views()?;
-    let look = Look { jitter: false, ..Look::default() };
+    let look = Look::default();
     let (picture, _) = cut.renderer.draw(&views, &look, [pixels; 2])?;
     let light = |&[y, z]: &[f64; 2]| {
         let world = cut.grid.to_world([x, y, z]).map(|c| c as f32);

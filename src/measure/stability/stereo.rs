@@ -167,7 +167,7 @@ fn compare(renderer: &Renderer, volume: &Volume, plan: &Plan, separation_mm: f32
     let rig =
         StereoRig { position: framing.position.normalize() * DISTANCE_MM, ipd_mm: separation_mm, ..framing };
     let views = rig.views(1.0, 50.0, 1500.0)?;
-    let look = Look { jitter: false, ..Look::default() };
+    let look = Look::default();
     let (picture, _) = renderer.draw(&views, &look, [plan.pixels; 2])?;
 
     let size = plan.pixels as usize;

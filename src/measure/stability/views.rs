@@ -242,7 +242,7 @@ impl Stage {
         let half_width = 0.35;
         let rig = StereoRig { ipd_mm: 0.0, ..self.rig(2.2) };
         let [straight, _] = self.views(rig)?;
-        let look = Look { jitter: false, ..Look::default() };
+        let look = Look::default();
         // Twice as wide as an eye's, with the same pixels.
         let tan = |left: f32, right: f32| Tangents { left, right, up: half_width, down: -half_width };
         let wide = View { tan: tan(-2.0 * half_width, 2.0 * half_width), ..straight };

@@ -1,6 +1,6 @@
 //! The volume as one eye sees it (CAO §3.5 step 6).
 //!
-//! Along the ray of each pixel, front to back, samples at t_begin + (k + phase)·Δt in mm:
+//! Along the ray of each pixel, front to back, samples at t_begin + (k + ½)·Δt in mm:
 //!
 //! ```text
 //! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
@@ -120,10 +120,9 @@ fn pixel(
     let box_range = crossing(&frame.grid, origin, direction);
     let begin = box_range[0].max(f64::from(view.near_mm) * slant);
     let end = box_range[1].min(f64::from(view.far_mm) * slant);
-    let phase = if frame.look.jitter { gradient_noise(centre) } else { 0.5 };
 
     let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
-    let samples = (0..).map(|k| begin + (f64::from(k) + phase) * frame.step_mm);
+    let samples = (0..).map(|k| begin + (f64::from(k) + 0.5) * frame.step_mm);
     let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
     let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
     let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
@@ -199,12 +198,6 @@ fn crossing(grid: &Grid, origin: DVec3, direction: DVec3) -> [f64; 2] {
     [enter, leave]
 }
 
-/// Interleaved gradient noise in [0, 1) of a pixel's centre (Jimenez, SIGGRAPH 2014), against banding.
-fn gradient_noise(centre: Vec2) -> f64 {
-    let [x, y] = centre.to_array().map(f64::from);
-    (52.982_918_9 * (0.067_110_56 * x + 0.005_837_15 * y).fract()).fract()
-}
-
 /// |n·l|, or 1 where there is no surface.
 fn surface(frame: &Frame, position: [f64; 3]) -> f64 {
     let gradient = DVec3::from_array(std::array::from_fn(|axis| {
@@ -267,7 +260,6 @@ mod tests {
                     diffuse: 0.5,
                     light: Vec3::new(0.0, 0.6, 0.8),
                     occluded: true,
-                    jitter: false,
                     ..Look::default()
                 },
             }
@@ -419,8 +411,7 @@ mod tests {
 
     #[test]
     fn equal_eyes_see_equal_images() {
-        let mut scene = Scene::even(0.15);
-        scene.look.jitter = true;
+        let scene = Scene::even(0.15);
         let rig = StereoRig::framing(std::array::from_fn(|i| 2.0 * [5.0, 6.0, 8.0][i]), 30.0, 20.0);
         let draw =
             |rig: StereoRig| rig.views(1.2, 1.0, 300.0).unwrap().map(|v| scene.draw(&v, [12, 10], 0.5));
@@ -428,23 +419,6 @@ mod tests {
         assert_eq!(left, right);
         let [left, right] = draw(rig);
         assert_ne!(left, right);
-    }
-
-    /// Jitter moves samples, it does not change what is there.
-    #[test]
-    fn jitter_changes_alpha_by_less_than_a_step() {
-        let mut scene = Scene::even(0.1);
-        let view = from_above(100.0);
-        let still = scene.draw(&view, SIZE, 0.5);
-        scene.look.jitter = true;
-        let moved = scene.draw(&view, SIZE, 0.5);
-        let largest = still.colour.iter().zip(&moved.colour).map(|(a, b)| (a[3] - b[3]).abs());
-        let largest = largest.fold(0.0, f32::max);
-        assert!(largest > 0.0 && largest < 0.1 * 0.5, "{largest}");
-        let noise: Vec<f64> =
-            (0..1000).map(|i| gradient_noise(Vec2::new((i % 40) as f32, (i / 40) as f32))).collect();
-        assert!(noise.iter().all(|n| (0.0..1.0).contains(n)));
-        assert!((noise.iter().sum::<f64>() / 1000.0 - 0.5).abs() < 0.02);
     }
 
     #[test]
