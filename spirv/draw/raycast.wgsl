@@ -114,6 +114,9 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     var hidden = 0xffffffffu;
     // The sample at which the last leap over something hidden ended.
     var landed = 0xffffffffu;
+    // The clip of the last cut, and the depth at which the ray came out of it.
+    var cut = NO_CLIP;
+    var t_cut = 0.0;
     loop {
         let t = ray.begin + (f32(k) + 0.5) * ray.step;
         if !(t < ray.end) {
@@ -171,9 +174,13 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             shown = start + t_shown * along;
             value = value_at(shown);
             a = opacity_of(value);
+            cut = hiding(eye.origin.xyz + t_hidden * ray.direction);
+            t_cut = t_shown;
         }
         let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
-        colour += (1.0 - alpha) * covered * shaded(shown, value);
+        let beside = (t_shown - t_cut) * length(ray.direction);
+        let at = Shown(shown, eye.origin.xyz + t_shown * ray.direction, value, cut, beside);
+        colour += (1.0 - alpha) * covered * shaded(at, ray.direction);
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;

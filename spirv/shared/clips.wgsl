@@ -125,6 +125,19 @@ fn visible_to(among: u32, world: vec3<f32>) -> bool {
     return true;
 }
 
+// None of the clips.
+const NO_CLIP = MOST_CLIPS;
+
+// The first clip that hides the point.
+fn hiding(world: vec3<f32>) -> u32 {
+    for (var c = 0u; c < clips.count; c++) {
+        if inside(c, world) == (clips.clip[c].keep == 0u) {
+            return c;
+        }
+    }
+    return NO_CLIP;
+}
+
 fn visible(world: vec3<f32>) -> bool {
     return visible_to(ALL_CLIPS, world);
 }

@@ -23,8 +23,21 @@ fn surface_light(position: vec3<f32>) -> f32 {
     return abs(dot(gradient, frame.light.xyz)) / steepness;
 }
 
-// Linear red, green and blue of what has this value at an index position.
-fn shaded(position: vec3<f32>, value: f32) -> vec3<f32> {
-    let light = frame.ambient + frame.diffuse * surface_light(position);
-    return light * mix(1.0, frame.gain * ambient_at(position), frame.occluded) * colour_of(value);
+// A visible place of a ray.
+struct Shown {
+    // index coordinates
+    position: vec3<f32>,
+    // mm
+    world: vec3<f32>,
+    value: f32,
+    // the clip out of which the ray came last, NO_CLIP where there was none
+    cut: u32,
+    // mm of way since then
+    beside: f32,
+}
+
+// Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
+fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
+    let light = frame.ambient + frame.diffuse * surface_light(at.position);
+    return light * mix(1.0, frame.gain * ambient_at(at.position), frame.occluded) * colour_of(at.value);
 }

@@ -2,3 +2,4 @@
 
 pub mod brick_distance;
 pub mod raycast;
+pub mod shading;

@@ -12,20 +12,16 @@
 //! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
 
 use crate::clip::clips::{ClipField, visible};
-use crate::{Grid, each, trilinear, trilinear_clamped};
+use crate::draw::shading::{GAIN, Shown, shaded};
+use crate::{Grid, each, trilinear_clamped};
 use cao_kernels::raycast as kernel;
 use cao_model::look::Look;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2};
 
 /// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
 pub const TOLERANCE: f64 = 0.5;
-/// The ambient factor is shown times this: a flat wall's is ½.
-pub const GAIN: f64 = 2.0;
-/// Below this gradient of opacity per smallest spacing there is no surface, and the diffuse term is 1.
-pub const FLAT: f64 = 1e-4;
-const _: () = assert!(FLAT as f32 == kernel::FLAT);
 
 /// What is drawn; fields are x fastest.
 #[derive(Clone, Copy)]
@@ -130,6 +126,7 @@ fn pixel(
     // A white background, or a white sample that faces the light.
     let brightest = 1.0_f64.max(light * if frame.look.occluded { GAIN } else { 1.0 });
     let mut hidden_at = f64::NEG_INFINITY;
+    let (mut clip, mut cut_at) = (None, 0.0);
     for t in samples.take_while(|&t| t < end) {
         if frame.transfer.opacity_at(value_at(t)) == 0.0 {
             continue;
@@ -139,15 +136,20 @@ fn pixel(
             continue;
         }
         let follows_hidden = t - hidden_at < 1.5 * frame.step_mm;
-        let t = if follows_hidden { cut(hidden_at, t, shown_at) } else { t };
-        let position = at(t);
+        let t = if follows_hidden {
+            let (before, behind) = cut(hidden_at, t, shown_at);
+            clip = frame.clips.iter().position(|clip| clip.hides((origin + before * direction).as_vec3()));
+            cut_at = behind;
+            behind
+        } else {
+            t
+        };
         let value = value_at(t);
+        let shown =
+            Shown { position: at(t), world: origin + t * direction, value, cut: clip, beside: t - cut_at };
         let opacity = f64::from(frame.transfer.opacity_at(value));
         let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
-        let shade = if frame.look.occluded { GAIN * ambient(position) } else { 1.0 };
-        let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse) * surface(frame, position);
-        let emitted = Vec3::from_array(frame.transfer.colour_at(value)).as_dvec3();
-        colour += (1.0 - alpha) * covered * shade * light * emitted;
+        colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, ambient);
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
             depth = vulkan_depth(view, t / slant);
@@ -164,9 +166,9 @@ fn srgb_slope(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 } else { 1.055 / 2.4 * linear.min(1.0).powf(1.0 / 2.4 - 1.0) }
 }
 
-/// Where a ray comes out of a clip, between a hidden and a visible sample, by a few halvings of their distance: a cut face is
-/// shaded at one depth.
-fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> f64 {
+/// Where a ray comes out of a clip, between a hidden and a visible sample, by a few halvings of their distance: just before and just
+/// behind. A cut face is shaded at one depth.
+fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> (f64, f64) {
     for _ in 0..kernel::CUT_HALVINGS {
         let middle = (hidden + shown) / 2.0;
         if shown_at(middle) {
@@ -175,7 +177,7 @@ fn cut(mut hidden: f64, mut shown: f64, shown_at: impl Fn(f64) -> bool) -> f64 {
             hidden = middle;
         }
     }
-    shown
+    (hidden, shown)
 }
 
 /// Distances in mm at which a ray enters and leaves the volume, the box of index coordinates −½ … dims − ½; the first
@@ -196,22 +198,6 @@ fn crossing(grid: &Grid, origin: DVec3, direction: DVec3) -> [f64; 2] {
         leave = leave.min(a.max(b));
     }
     [enter, leave]
-}
-
-/// |n·l|, or 1 where there is no surface.
-fn surface(frame: &Frame, position: [f64; 3]) -> f64 {
-    let gradient = DVec3::from_array(std::array::from_fn(|axis| {
-        let beside = |shift: f64| {
-            let mut at = position;
-            at[axis] += shift;
-            trilinear(&frame.grid, frame.opacity, at)
-        };
-        (beside(1.0) - beside(-1.0)) / (2.0 * frame.grid.spacing[axis])
-    }));
-    if gradient.length() * frame.grid.min_spacing() < FLAT {
-        return 1.0;
-    }
-    gradient.normalize().dot(frame.look.light.as_dvec3()).abs()
 }
 
 /// Depth buffer value at a distance in mm along the view axis.
