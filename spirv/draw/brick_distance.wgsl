@@ -36,11 +36,8 @@ fn to_rays(index: u32) -> vec2<u32> {
     return vec2(hidden, asked);
 }
 
-fn first_of(index: u32) -> vec2<u32> {
-    if occupancy.visible[index] == 0u {
-        return vec2(FAR);
-    }
-    return vec2(0u, select(0u, FAR, to_rays(index).x == 1u));
+fn first_of(index: u32) -> u32 {
+    return select(FAR, 0u, occupancy.visible[index] != 0u && to_rays(index).x == 0u);
 }
 
 // One invocation a brick.
@@ -51,13 +48,13 @@ fn first(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) 
         return;
     }
     let x = index % params.bricks.x;
-    var nearest = vec2(FAR);
-    for (var d = 0u; d < params.bricks.x && any(vec2(d) < nearest); d++) {
+    var nearest = FAR;
+    for (var d = 0u; d < params.bricks.x && d < nearest; d++) {
         if d <= x {
-            nearest = min(nearest, max(first_of(index - d), vec2(d)));
+            nearest = min(nearest, max(first_of(index - d), d));
         }
         if x + d < params.bricks.x {
-            nearest = min(nearest, max(first_of(index + d), vec2(d)));
+            nearest = min(nearest, max(first_of(index + d), d));
         }
     }
     distances.word[index] = word_of(nearest, to_rays(index).y);
@@ -73,13 +70,13 @@ fn next(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let stride = select(params.bricks.x * params.bricks.y, params.bricks.x, along_y);
     let length = select(params.bricks.z, params.bricks.y, along_y);
     let place = index / stride % length;
-    var nearest = vec2(FAR);
-    for (var d = 0u; d < length && any(vec2(d) < nearest); d++) {
+    var nearest = FAR;
+    for (var d = 0u; d < length && d < nearest; d++) {
         if d <= place {
-            nearest = min(nearest, max(distances_of(before.word[index - d * stride]), vec2(d)));
+            nearest = min(nearest, max(distance_in(before.word[index - d * stride]), d));
         }
         if place + d < length {
-            nearest = min(nearest, max(distances_of(before.word[index + d * stride]), vec2(d)));
+            nearest = min(nearest, max(distance_in(before.word[index + d * stride]), d));
         }
     }
     distances.word[index] = word_of(nearest, asked_in(before.word[index]));

@@ -1,5 +1,7 @@
-// Stage 6 of CAO section 3.5: the volume by ray casting, all views in one dispatch. Front to back, early termination, leaps over bricks that show nothing, clipped samples skipped by the shadow test of section 3.2, ambient factor
-// from V_AO at every sample that shows anything.
+// Stage 6 of CAO section 3.5: the volume by ray casting, all views in one dispatch. Front to back, a segment between two samples at a time,
+// through which the value is taken as linear and its opacity integrated exactly; steps halve where a segment's opacity says little of its
+// parts. Leaps over bricks that show nothing, clipped parts skipped by the shadow test of section 3.2, ambient factor from V_AO where a
+// segment's light comes from.
 
 #include "shared/transfer.wgsl"
 
@@ -41,11 +43,18 @@ var<immediate> params: RaycastParams;
 // Pixels along the edge of a workgroup's tile: its rays read nearly the same bricks.
 const TILE = 8u;
 
-// Part of a step by which a leap ends early: more than rounding moves a sample, so that none is left out.
+// Part of a step by which a leap ends early: more than rounding moves a sample, so that none behind it is left out.
 const LEAP_MARGIN = 0.1;
 
-// Halvings of a step at a cut: to 1/16 of it.
-const CUT_HALVINGS = 4u;
+// Halvings of a step at a cut: a face's depth errs by less than 1/1000 of a voxel.
+const CUT_HALVINGS = 8u;
+
+// Parts that a step can be halved into.
+const PARTS = 16u;
+
+// A step is halved if it stops more than this share of light, and more or less than this share of what it would if all of it were as one
+// of its ends.
+const MOST_CHANGE = 0.125;
 
 fn texel_at(x: i32, y: i32, z: i32) -> f32 {
     return textureLoad(volume, vec3(x, y, z), 0).r;
@@ -96,98 +105,234 @@ fn ends(colour: vec3<f32>, alpha: f32) -> bool {
     return rest * min(12.92, 0.4396 * pow(darkest, -7.0 / 12.0)) <= frame.remainder;
 }
 
+// The brick that a sample reads.
+fn brick_of(position: vec3<f32>, bricks: vec3<u32>) -> vec3<u32> {
+    return vec3<u32>(clamp(vec3<i32>(floor(position / f32(BRICK))), vec3(0), vec3<i32>(bricks) - 1));
+}
+
+// Which clips may hide something there.
+fn asked_at(position: vec3<f32>, bricks: vec3<u32>) -> u32 {
+    return asked_in(distances.word[brick_index(brick_of(position, bricks), bricks)]);
+}
+
+// A value, its piece of the transfer function and its opacity.
+struct Sample {
+    value: f32,
+    piece: u32,
+    opacity: f32,
+}
+
+fn sample_of(value: f32) -> Sample {
+    let piece = piece_of(value);
+    return Sample(value, piece, opacity_in(piece, value));
+}
+
+// What a segment of a ray adds in front of black.
+struct Segment {
+    // the share of light that it stops
+    alpha: f32,
+    // that share of its colours, unlit
+    colour: vec3<f32>,
+    // where its light comes from: share of its length
+    centre: f32,
+}
+
+// Optical depth of a reference length along which the opacity goes evenly from a to b: the mean of -ln(1 - x) over [a, b].
+fn mean_depth(a: f32, b: f32) -> f32 {
+    let u = 1.0 - a;
+    let v = 1.0 - b;
+    let middle = 0.5 * (u + v);
+    let width = v - u;
+    if abs(width) <= 0.2 * middle {
+        // In closed form its digits cancel; here the next term of the series is below 1e-5.
+        return -log(middle) + width * width / (24.0 * middle * middle);
+    }
+    // Where nothing passes, x ln x is 0.
+    return 1.0 - (select(v * log(v), 0.0, v <= 0.0) - select(u * log(u), 0.0, u <= 0.0)) / width;
+}
+
+// Between two samples, `length` reference lengths apart: piece by piece of the transfer function.
+fn segment(near: Sample, far: Sample, length: f32) -> Segment {
+    let up = far.value >= near.value;
+    let whole = far.value - near.value;
+    var open = 1.0;
+    var colour = vec3(0.0);
+    var centre = 0.0;
+    var here = near;
+    var begun = 0.0;
+    loop {
+        let last = here.piece == far.piece;
+        // Up to the next control point; in the last piece it does not count.
+        let point = transfer.opacity[select(max(here.piece, 1u) - 1u, min(here.piece, MOST_POINTS - 1u), up)];
+        let value = select(point.x, far.value, last);
+        let opacity = select(point.y, far.opacity, last);
+        let done = select(clamp((value - near.value) / whole, begun, 1.0), 1.0, last);
+        if max(here.opacity, opacity) > 0.0 && done > begun {
+            let stops = min(here.opacity, opacity) >= 1.0;
+            let depth = length * (done - begun) * mean_depth(here.opacity, opacity);
+            let passes = select(exp(-depth), 0.0, stops);
+            let share = open * (1.0 - passes);
+            // Where the light of an even stretch leaves it, on average; and how much later where opacity rises.
+            let even = select(1.0 / depth - passes / (1.0 - passes), 0.5 - depth / 12.0, depth < 0.05);
+            let later = passes * (opacity - here.opacity) / (6.0 * (opacity + here.opacity));
+            let within = select(even + later, 0.0, stops);
+            colour += share * colour_of(mix(here.value, value, within));
+            centre += share * mix(begun, done, within);
+            open *= passes;
+        }
+        if last || open <= 0.0 {
+            break;
+        }
+        begun = done;
+        let piece = select(here.piece - 1u, here.piece + 1u, up);
+        here = Sample(value, piece, transfer.opacity[select(piece, piece - 1u, up)].y);
+    }
+    let alpha = 1.0 - open;
+    return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
+}
+
+// Whether a step has to be halved: its opacity is not that of its ends, because a surface is in it, and matters.
+fn varies(found: Segment, near: Sample, far: Sample, length: f32) -> bool {
+    if found.alpha <= MOST_CHANGE {
+        return false;
+    }
+    let passes = 1.0 - vec2(near.opacity, far.opacity);
+    let ends = 1.0 - select(pow(passes, vec2(length)), vec2(0.0), passes <= vec2(0.0));
+    return any(abs(ends - found.alpha) > vec2(MOST_CHANGE));
+}
+
+// View depths, a hidden and a visible one, between which a clip cuts the ray: the last halves of these.
+fn cut_between(sides: vec2<f32>, eye: Eye, direction: vec3<f32>) -> vec2<f32> {
+    var found = sides;
+    for (var i = 0u; i < CUT_HALVINGS; i++) {
+        let middle = 0.5 * (found.x + found.y);
+        if visible(eye.origin.xyz + middle * direction) {
+            found.y = middle;
+        } else {
+            found.x = middle;
+        }
+    }
+    return found;
+}
+
 // What an eye sees at a place in pixels.
 fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
-
-    let exponent = frame.spacing.w / frame.light.w;
+    let part = ray.step / f32(PARTS);
+    // mm of way a mm of view depth
+    let slant = frame.spacing.w / ray.step;
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
-    let last_brick = vec3<i32>(bricks) - 1;
 
     var colour = vec3(0.0);
     var alpha = 0.0;
     var depth = 1.0;
-    // Samples so far, and that number at the last hidden one: integers, for an f32 stops counting at 2^24.
-    var k = 0u;
-    var hidden = 0xffffffffu;
-    // The sample at which the last leap over something hidden ended.
-    var landed = 0xffffffffu;
+    // Parts of steps so far, integers so that samples keep their places whatever is leapt over; and how many the next step has.
+    var n = 0u;
+    var size = PARTS;
+    // Up to here the ray is known to be in the bricks that it looked at last.
+    var n_out = 0u;
+    // Value at n. After a leap, and at first, it is not known.
+    var here = 0.0;
+    var known = false;
     // The clip of the last cut, and the depth at which the ray came out of it.
     var cut = NO_CLIP;
     var t_cut = 0.0;
     loop {
-        let t = ray.begin + (f32(k) + 0.5) * ray.step;
+        let t = ray.begin + f32(n) * part;
         if !(t < ray.end) {
             break;
         }
-        let position = start + t * along;
-        let brick = clamp(vec3<i32>(floor(position / f32(BRICK))), vec3(0), last_brick);
-        let word = distances.word[brick_index(vec3<u32>(brick), bricks)];
-        let far = vec2<i32>(distances_of(word));
-        let to_opacity = far.x;
-        let leap = far.y;
-        if leap > 0 && k != landed {
-            // To the first sample behind the bricks nearer than `leap`; samples keep their places, so the picture does not
-            // change.
-            let low = vec3<f32>(brick - leap + 1) * f32(BRICK);
-            let high = vec3<f32>(brick + leap) * f32(BRICK);
-            let out_low = select((low - start) / along, vec3(1e30), brick < vec3(leap));
-            let out_high = select((high - start) / along, vec3(1e30), brick + leap > last_brick);
+        if n >= n_out && size == PARTS {
+            let position = start + t * along;
+            let brick = vec3<i32>(brick_of(position, bricks));
+            let leap = i32(distance_in(distances.word[brick_index(vec3<u32>(brick), bricks)]));
+            // To the last sample before the bricks that are not nearer than `leap`, or out of this one.
+            let way = max(leap, 1);
+            let low = vec3<f32>(brick - way + 1) * f32(BRICK);
+            let high = vec3<f32>(brick + way) * f32(BRICK);
+            let out_low = select((low - start) / along, vec3(1e30), brick < vec3(way));
+            let out_high = select((high - start) / along, vec3(1e30), brick + way >= vec3<i32>(bricks));
             // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
             let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
             let t_out = min(out.x, min(out.y, out.z));
-            let first = ceil((t_out - ray.begin) / ray.step - 0.5 - LEAP_MARGIN);
-            k = max(k + 1u, u32(clamp(first, 0.0, 1e9)));
-            if to_opacity < leap {
-                // What a clip hides is among what is leapt over: the last sample of it may be the one before a cut.
-                k -= 1u;
-                landed = k;
+            let last = PARTS * u32(clamp(floor((t_out - ray.begin) / ray.step - LEAP_MARGIN), 0.0, 1e8));
+            if leap > 0 {
+                if last > n {
+                    n = last;
+                    known = false;
+                    continue;
+                }
+            } else {
+                n_out = last;
             }
-            continue;
         }
-        k += 1u;
-        var value = value_at(position);
-        var a = opacity_of(value);
-        if a <= 0.0 {
-            continue;
-        }
-        if !visible_to(asked_in(word), eye.origin.xyz + t * ray.direction) {
-            hidden = k;
-            continue;
-        }
-        var t_shown = t;
-        var shown = position;
-        if hidden == k - 1u {
-            // The sample after a hidden one stands for the cut between them: it moves there, so that a cut face is shaded at
-            // one depth and shows no rings.
-            var t_hidden = t - ray.step;
-            for (var i = 0u; i < CUT_HALVINGS; i++) {
-                let middle = 0.5 * (t_hidden + t_shown);
-                if visible(eye.origin.xyz + middle * ray.direction) {
-                    t_shown = middle;
-                } else {
-                    t_hidden = middle;
+        let t_next = select(t, min(ray.begin + f32(n + size) * part, ray.end), known);
+        let next = value_at(start + t_next * along);
+        // Whether any value between has opacity.
+        if known && max(here, next) > transfer.least && min(here, next) < transfer.most {
+            var t_from = t;
+            var t_to = t_next;
+            var near = here;
+            var far = next;
+            var shows = true;
+            if clips.count > 0u {
+                let shown_from = visible_to(asked_at(start + t * along, bricks), eye.origin.xyz + t * ray.direction);
+                let shown_to = visible_to(asked_at(start + t_next * along, bricks), eye.origin.xyz + t_next * ray.direction);
+                shows = shown_from || shown_to;
+                if shown_from != shown_to {
+                    // Only the part on one side of the cut shows.
+                    let sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
+                    let at_cut = value_at(start + sides.y * along);
+                    if shown_to {
+                        t_from = sides.y;
+                        near = at_cut;
+                        cut = hiding(eye.origin.xyz + sides.x * ray.direction);
+                        t_cut = sides.y;
+                    } else {
+                        t_to = sides.y;
+                        far = at_cut;
+                    }
                 }
             }
-            shown = start + t_shown * along;
-            value = value_at(shown);
-            a = opacity_of(value);
-            cut = hiding(eye.origin.xyz + t_hidden * ray.direction);
-            t_cut = t_shown;
+            if shows {
+                let from_sample = sample_of(near);
+                let to_sample = sample_of(far);
+                // in reference lengths
+                let length = (t_to - t_from) * slant / frame.light.w;
+                let found = segment(from_sample, to_sample, length);
+                if size > 1u && varies(found, from_sample, to_sample, length) {
+                    size /= 2u;
+                    continue;
+                }
+                if found.alpha > 0.0 {
+                    let t_shown = mix(t_from, t_to, found.centre);
+                    let at = Shown(
+                        start + t_shown * along,
+                        eye.origin.xyz + t_shown * ray.direction,
+                        mix(near, far, found.centre),
+                        found.colour / found.alpha,
+                        cut,
+                        (t_shown - t_cut) * slant,
+                    );
+                    colour += (1.0 - alpha) * found.alpha * shaded(at, ray.direction);
+                    alpha += (1.0 - alpha) * found.alpha;
+                    if depth == 1.0 && alpha >= 0.5 {
+                        depth = eye.depth.x + eye.depth.y / t_shown;
+                    }
+                    if ends(colour, alpha) {
+                        break;
+                    }
+                }
+            }
         }
-        let covered = 1.0 - select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
-        let beside = (t_shown - t_cut) * length(ray.direction);
-        let at = Shown(shown, eye.origin.xyz + t_shown * ray.direction, value, cut, beside);
-        colour += (1.0 - alpha) * covered * shaded(at, ray.direction);
-        alpha += (1.0 - alpha) * covered;
-        if depth == 1.0 && alpha >= 0.5 {
-            depth = eye.depth.x + eye.depth.y / t_shown;
+        here = next;
+        if known {
+            n += size;
+            size = min(min(2u * size, PARTS), n & (~n + 1u));
         }
-        if ends(colour, alpha) {
-            break;
-        }
+        known = true;
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
 }

@@ -54,8 +54,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var i = 1u; i < BRICK + 2u; i++) {
         range = joined(range, columns[lane * BRICK + i]);
     }
-    // Filtering rounds; one part in 2^16 of the texel range is more than it can move a value.
-    let slack = abs(params.scale) * 1.6e-5;
+    // Filtering rounds: by less than one part in 2^16 of the largest texel. Texels of 0 stay 0.
+    let slack = 1.6e-5 * max(abs(range.x - params.bias), abs(range.y - params.bias));
     let opacity = largest_opacity(range.x - slack, range.y + slack);
     occupancy.visible[brick_index(brick, params.bricks)] = select(0u, 1u, opacity > 0.0);
 }

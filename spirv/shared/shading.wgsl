@@ -30,6 +30,8 @@ struct Shown {
     // mm
     world: vec3<f32>,
     value: f32,
+    // unlit, linear
+    colour: vec3<f32>,
     // the clip out of which the ray came last, NO_CLIP where there was none
     cut: u32,
     // mm of way since then
@@ -39,5 +41,5 @@ struct Shown {
 // Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
 fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
     let light = frame.ambient + frame.diffuse * surface_light(at.position);
-    return light * mix(1.0, frame.gain * ambient_at(at.position), frame.occluded) * colour_of(at.value);
+    return light * mix(1.0, frame.gain * ambient_at(at.position), frame.occluded) * at.colour;
 }

@@ -7,6 +7,9 @@ const MOST_POINTS = 64u;
 struct Transfer {
     opacity_points: u32,
     colour_points: u32,
+    // values up to the one and from the other on have no opacity
+    least: f32,
+    most: f32,
     // value, opacity per reference length, slope towards the next point, unused
     opacity: array<vec4<f32>, MOST_POINTS>,
     // value, linear red, green, blue
@@ -15,13 +18,10 @@ struct Transfer {
 
 @group(0) @binding(1) var<storage, read> transfer: Transfer;
 
-// Kept between its ends: rounding must not leave 0 ... 1 or exceed what `largest_opacity` promises.
-fn opacity_of(value: f32) -> f32 {
-    if value < transfer.opacity[0].x {
-        return transfer.opacity[0].y;
-    }
-    // The first point above the value, by halving: of two equal points the second holds.
-    var low = 1u;
+// Number of the opacity's control points up to a value, found by halving: the piece before the first point is 0. Of two equal points the
+// second counts.
+fn piece_of(value: f32) -> u32 {
+    var low = 0u;
     var high = transfer.opacity_points;
     while low < high {
         let middle = (low + high) / 2u;
@@ -31,12 +31,21 @@ fn opacity_of(value: f32) -> f32 {
             low = middle + 1u;
         }
     }
-    let point = transfer.opacity[low - 1u];
-    if low == transfer.opacity_points {
+    return low;
+}
+
+// The opacity of a value in its piece. Kept between its ends: rounding must not leave 0 ... 1 or exceed what `largest_opacity` promises.
+fn opacity_in(piece: u32, value: f32) -> f32 {
+    let point = transfer.opacity[max(piece, 1u) - 1u];
+    if piece == 0u || piece == transfer.opacity_points {
         return point.y;
     }
-    let end = transfer.opacity[low].y;
+    let end = transfer.opacity[piece].y;
     return clamp(point.y + (value - point.x) * point.z, min(point.y, end), max(point.y, end));
+}
+
+fn opacity_of(value: f32) -> f32 {
+    return opacity_in(piece_of(value), value);
 }
 
 // Largest opacity of any value in [low, high]: at one of the ends or at a control point between them.

@@ -3,8 +3,8 @@
 //! `d(b) = min { max(|b_x − c_x|, |b_y − c_y|, |b_z − c_z|) : c shows something }`, in three passes, one an axis.
 //!
 //! In: `occupancy`, the words of `clip_bricks`. Out: `distances`, one u32 a brick, x fastest (`spirv/shared/distances.wgsl`): the
-//! distance to the nearest brick with opacity, that to the nearest with opacity that the clips do not hide as a whole, and a bit
-//! for each clip that hides any of what a ray reads in the brick. Cost: bricks × the distances found.
+//! distance to the nearest brick with opacity that the clips do not hide as a whole, and a bit for each clip that hides any of what a ray
+//! reads in the brick. Cost: bricks × the distances found.
 
 use crate::field::Field;
 use crate::host::rows_over;

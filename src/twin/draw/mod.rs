@@ -2,4 +2,5 @@
 
 pub mod brick_distance;
 pub mod raycast;
+pub mod segment;
 pub mod shading;

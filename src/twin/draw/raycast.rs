@@ -1,17 +1,19 @@
 //! The volume as one eye sees it (CAO §3.5 step 6).
 //!
-//! Along the ray of each pixel, front to back, samples at t_begin + (k + ½)·Δt in mm:
+//! Along the ray of each pixel, front to back, segments between samples at t_begin + k·Δt in mm (`segment.rs`):
 //!
 //! ```text
-//! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
-//! C  += (1 − A) α_k · TF_c(V(p_k)) · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
+//! α_k = 1 − exp ∫ ln(1 − TF_o(V)) dt/ℓ,  over the part of the segment that no clip hides
+//! C  += (1 − A) α_k · c_k · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
 //! A  += (1 − A) α_k                                                         until (1 − A)·L·E′(C) ≤ ½/255
 //! ```
 //!
-//! where L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
+//! where c_k is the segment's mean colour and p_k where its light comes from. A segment that stops more light than its ends alone say is
+//! halved, up to four times. L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
 //! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
 
 use crate::clip::clips::{ClipField, visible};
+use crate::draw::segment::{segment, varies};
 use crate::draw::shading::{GAIN, Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
 use cao_kernels::raycast as kernel;
@@ -22,6 +24,9 @@ use glam::{DVec3, Vec2};
 
 /// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
 pub const TOLERANCE: f64 = 0.5;
+
+/// Parts that a step can be halved into.
+const PARTS: u64 = kernel::PARTS as u64;
 
 /// What is drawn; fields are x fastest.
 #[derive(Clone, Copy)]
@@ -117,46 +122,58 @@ fn pixel(
     let begin = box_range[0].max(f64::from(view.near_mm) * slant);
     let end = box_range[1].min(f64::from(view.far_mm) * slant);
 
-    let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
-    let samples = (0..).map(|k| begin + (f64::from(k) + 0.5) * frame.step_mm);
     let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
     let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
     let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
     let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse);
     // A white background, or a white sample that faces the light.
     let brightest = 1.0_f64.max(light * if frame.look.occluded { GAIN } else { 1.0 });
-    let mut hidden_at = f64::NEG_INFINITY;
+    let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
     let (mut clip, mut cut_at) = (None, 0.0);
-    for t in samples.take_while(|&t| t < end) {
-        if frame.transfer.opacity_at(value_at(t)) == 0.0 {
-            continue;
+    // Parts of steps so far, and of the next one.
+    let (mut n, mut size) = (0, PARTS);
+    let place = |n: u64| begin + n as f64 * frame.step_mm / PARTS as f64;
+    while place(n) < end {
+        let (t, next) = (place(n), place(n + size).min(end));
+        let [mut from, mut to] = [t, next];
+        let [shown, stays] = [t, next].map(shown_at);
+        if shown != stays {
+            let (hidden, cut) = if stays { cut(t, next, shown_at) } else { cut(next, t, shown_at) };
+            if stays {
+                clip =
+                    frame.clips.iter().position(|clip| clip.hides((origin + hidden * direction).as_vec3()));
+                (from, cut_at) = (cut, cut);
+            } else {
+                to = cut;
+            }
         }
-        if !shown_at(t) {
-            hidden_at = t;
-            continue;
+        if shown || stays {
+            let values = [from, to].map(value_at);
+            let length = (to - from) / frame.reference_mm;
+            let found = segment(frame.transfer, values[0], values[1], length);
+            if size > 1 && varies(frame.transfer, &found, values[0], values[1], length) {
+                size /= 2;
+                continue;
+            }
+            if found.alpha > 0.0 {
+                let t = from + found.centre * (to - from);
+                let value = values[0] + found.centre as f32 * (values[1] - values[0]);
+                let world = origin + t * direction;
+                let tint = found.colour / found.alpha;
+                let shown =
+                    Shown { position: at(t), world, value, colour: tint, cut: clip, beside: t - cut_at };
+                colour += (1.0 - alpha) * found.alpha * shaded(frame, &shown, direction, ambient);
+                alpha += (1.0 - alpha) * found.alpha;
+                if depth == 1.0 && alpha >= 0.5 {
+                    depth = vulkan_depth(view, t / slant);
+                }
+                if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
+                    break;
+                }
+            }
         }
-        let follows_hidden = t - hidden_at < 1.5 * frame.step_mm;
-        let t = if follows_hidden {
-            let (before, behind) = cut(hidden_at, t, shown_at);
-            clip = frame.clips.iter().position(|clip| clip.hides((origin + before * direction).as_vec3()));
-            cut_at = behind;
-            behind
-        } else {
-            t
-        };
-        let value = value_at(t);
-        let shown =
-            Shown { position: at(t), world: origin + t * direction, value, cut: clip, beside: t - cut_at };
-        let opacity = f64::from(frame.transfer.opacity_at(value));
-        let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
-        colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, ambient);
-        alpha += (1.0 - alpha) * covered;
-        if depth == 1.0 && alpha >= 0.5 {
-            depth = vulkan_depth(view, t / slant);
-        }
-        if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
-            break;
-        }
+        n += size;
+        size = (2 * size).min(PARTS).min(1 << n.trailing_zeros());
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
 }
@@ -214,6 +231,7 @@ mod tests {
     use cao_model::clip::{Clip, Mode, Pose, Shape};
     use cao_model::view::{StereoRig, Tangents};
     use glam::Quat;
+    use glam::Vec3;
 
     /// One opacity for every value, colour by value.
     fn even(opacity: f32) -> TransferFunction {
@@ -386,8 +404,7 @@ mod tests {
         let scene = Scene::even(1.0);
         let image = scene.draw(&from_above(0.5), SIZE, 0.25);
         assert!(image.colour.iter().all(|c| c[3] == 1.0));
-        // The first sample lies half a step of depth (at most) behind the near plane.
-        assert!(image.depth.iter().all(|&d| d > 0.0 && d < 0.13));
+        assert!(image.depth.iter().all(|&d| d < 1e-6));
         // A near plane behind the volume leaves nothing; so does a far plane before it.
         for (near_mm, far_mm) in [(20.0, 30.0), (0.1, 1.0)] {
             let view = View { near_mm, far_mm, ..from_above(10.0) };

@@ -3,7 +3,7 @@
 use crate::draw::raycast::Frame;
 use crate::trilinear;
 use cao_kernels::raycast as kernel;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// The ambient factor is shown times this: a flat wall's is ½.
 pub const GAIN: f64 = 2.0;
@@ -19,6 +19,8 @@ pub struct Shown {
     pub world: DVec3,
     /// V there.
     pub value: f32,
+    /// Unlit, linear.
+    pub colour: DVec3,
     /// The clip out of which the ray came last.
     pub cut: Option<usize>,
     /// Millimetres of way since then.
@@ -34,7 +36,7 @@ pub fn shaded(
 ) -> DVec3 {
     let shade = if frame.look.occluded { GAIN * ambient(at.position) } else { 1.0 };
     let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse) * surface(frame, at.position);
-    shade * light * Vec3::from_array(frame.transfer.colour_at(at.value)).as_dvec3()
+    shade * light * at.colour
 }
 
 /// |n·l|, or 1 where there is no surface.
