@@ -4,10 +4,8 @@
 #include "shared/transfer.wgsl"
 
 @group(0) @binding(0) var volume: texture_3d<f32>;
-@group(0) @binding(2) var opacity: texture_3d<f32>;
 @group(0) @binding(3) var ambient: texture_3d<f32>;
-// linear; transparent outside, and continued from the edge
-@group(0) @binding(4) var field: sampler;
+// linear, continued from the edge
 @group(0) @binding(5) var edge: sampler;
 @group(0) @binding(6) var<uniform> frame: Frame;
 @group(0) @binding(7) var<storage, read> distances: Distances;

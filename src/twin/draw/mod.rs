@@ -1,5 +1,6 @@
 //! Pictures.
 
 pub mod brick_distance;
+pub mod clip_normal;
 pub mod raycast;
 pub mod shading;

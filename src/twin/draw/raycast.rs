@@ -4,15 +4,15 @@
 //!
 //! ```text
 //! α_k = 1 − (1 − TF_o(V(p_k)))^(Δt/ℓ),  0 where a clip hides p_k
-//! C  += (1 − A) α_k · TF_c(V(p_k)) · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
+//! C  += (1 − A) α_k · L(p_k)                                              L: shading.rs
 //! A  += (1 − A) α_k                                                         until (1 − A)·L·E′(C) ≤ ½/255
 //! ```
 //!
-//! where L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
-//! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
+//! where the last L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot
+//! change an 8-bit pixel by more than half a level.
 
 use crate::clip::clips::{ClipField, visible};
-use crate::draw::shading::{GAIN, Shown, shaded};
+use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
 use cao_kernels::raycast as kernel;
 use cao_model::look::Look;
@@ -34,15 +34,13 @@ pub struct Frame<'a> {
     pub transfer: &'a TransferFunction,
     /// Length ℓ in mm that opacities are for.
     pub reference_mm: f64,
-    /// V_o, opacity after clipping.
-    pub opacity: &'a [f32],
     /// V_AO, ambient factor.
     pub ambient: &'a [f32],
     /// Clips.
     pub clips: &'a [ClipField],
     /// Distance Δt of samples in mm.
     pub step_mm: f64,
-    /// Light.
+    /// Light; where it is the head's, each view is a head.
     pub look: Look,
 }
 
@@ -122,9 +120,9 @@ fn pixel(
     let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
     let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
     let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
-    let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse);
-    // A white background, or a white sample that faces the light.
-    let brightest = 1.0_f64.max(light * if frame.look.occluded { GAIN } else { 1.0 });
+    // A white background, or a white sample that faces the light and mirrors it.
+    let brightest = 1.0_f64.max(frame.look.parts().iter().sum::<f32>().into());
+    let light = frame.look.towards_light(view.orientation).as_dvec3();
     let mut hidden_at = f64::NEG_INFINITY;
     let (mut clip, mut cut_at) = (None, 0.0);
     for t in samples.take_while(|&t| t < end) {
@@ -149,7 +147,7 @@ fn pixel(
             Shown { position: at(t), world: origin + t * direction, value, cut: clip, beside: t - cut_at };
         let opacity = f64::from(frame.transfer.opacity_at(value));
         let covered = 1.0 - (1.0 - opacity).powf(frame.step_mm / frame.reference_mm);
-        colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, ambient);
+        colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, light, ambient);
         alpha += (1.0 - alpha) * covered;
         if depth == 1.0 && alpha >= 0.5 {
             depth = vulkan_depth(view, t / slant);
@@ -212,8 +210,9 @@ mod tests {
     use crate::clip::classify::tests::{field, random_clip, shapes};
     use crate::random::Random;
     use cao_model::clip::{Clip, Mode, Pose, Shape};
+    use cao_model::look::{LightFrom, Occluded, Shading};
     use cao_model::view::{StereoRig, Tangents};
-    use glam::Quat;
+    use glam::{Quat, Vec3};
 
     /// One opacity for every value, colour by value.
     fn even(opacity: f32) -> TransferFunction {
@@ -225,7 +224,6 @@ mod tests {
         grid: Grid,
         values: Vec<f32>,
         transfer: TransferFunction,
-        opacity: Vec<f32>,
         ambient: Vec<f32>,
         clips: Vec<ClipField>,
         look: Look,
@@ -238,14 +236,15 @@ mod tests {
                 grid,
                 values: vec![0.0; grid.len()],
                 transfer: even(opacity),
-                opacity: vec![opacity; grid.len()],
                 ambient: vec![0.5; grid.len()],
                 clips: Vec::new(),
                 look: Look {
                     ambient: 0.25,
                     diffuse: 0.5,
+                    specular: 0.0,
                     light: Vec3::new(0.0, 0.6, 0.8),
-                    occluded: true,
+                    light_from: LightFrom::World,
+                    occluded: Occluded::All,
                     ..Look::default()
                 },
             }
@@ -257,7 +256,6 @@ mod tests {
                 values: &self.values,
                 transfer: &self.transfer,
                 reference_mm: 1.0,
-                opacity: &self.opacity,
                 ambient: &self.ambient,
                 clips: &self.clips,
                 step_mm,
@@ -343,7 +341,7 @@ mod tests {
         assert!(covered > 50 && covered < image.depth.len() - 50, "{covered}");
     }
 
-    /// On the upper face the gradient is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
+    /// On the upper face the normal is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
     #[test]
     fn colour_is_shaded_by_ambient_factor_and_gradient() {
         let view = from_above(30.0);
@@ -355,12 +353,40 @@ mod tests {
                 assert!((found - expected).abs() < 1e-6, "{found} {expected}");
             }
         };
-        check(&scene, GAIN as f32 * 0.5 * (0.25 + 0.5 * 0.8));
-        scene.look.occluded = false;
         check(&scene, 0.25 + 0.5 * 0.8);
-        // Opacity that varies nowhere has no surface.
-        scene.opacity.fill(0.0);
-        check(&scene, 0.25 + 0.5);
+        // Half as much is half as light, all of it or what comes from everywhere; more is not lighter.
+        scene.ambient.fill(0.25);
+        check(&scene, 0.5 * (0.25 + 0.5 * 0.8));
+        scene.look.occluded = Occluded::Ambient;
+        check(&scene, 0.5 * 0.25 + 0.5 * 0.8);
+        scene.ambient.fill(0.9);
+        check(&scene, 0.25 + 0.5 * 0.8);
+        scene.ambient.fill(0.25);
+        scene.look.shading = Shading::Phong;
+        check(&scene, 0.25 + 0.5 * 0.8);
+        scene.look.shading = Shading::Ao;
+        check(&scene, 0.5);
+        scene.look.shading = Shading::None;
+        check(&scene, 1.0);
+        // From below nothing comes but to surfaces that are lit from both sides.
+        scene.look = Look { shading: Shading::Phong, light: -scene.look.light, ..scene.look };
+        check(&scene, 0.25);
+        scene.look.two_sided = true;
+        check(&scene, 0.25 + 0.5 * 0.8);
+    }
+
+    /// Behind the faces, opacity that varies nowhere has no surface: the light of no direction.
+    #[test]
+    fn where_there_is_no_surface_light_has_no_direction() {
+        let mut scene = Scene::even(0.2);
+        scene.look.shading = Shading::Phong;
+        // The eye and its near plane in the middle of the box.
+        let view = View { near_mm: 2.0, ..from_above(0.0) };
+        let image = scene.draw(&view, SIZE, 0.1);
+        for colour in &image.colour {
+            let expected = colour[3] * 0.8 * (0.25 + 0.5 * 0.5);
+            assert!((colour[2] - expected).abs() < 1e-5, "{colour:?}");
+        }
     }
 
     #[test]
@@ -414,7 +440,6 @@ mod tests {
         for _ in 0..60 {
             let mut scene = Scene::even(0.5);
             scene.grid = grid;
-            scene.opacity = random.opacities(grid.len());
             scene.ambient = random.opacities(grid.len());
             scene.values = random.opacities(grid.len());
             scene.transfer.opacity = vec![[0.0, 0.0], [1.0, 1.0]];
