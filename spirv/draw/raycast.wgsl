@@ -6,10 +6,8 @@
 #include "shared/transfer.wgsl"
 
 @group(0) @binding(0) var volume: texture_3d<f32>;
-@group(0) @binding(2) var opacity: texture_3d<f32>;
 @group(0) @binding(3) var ambient: texture_3d<f32>;
-// linear; transparent outside, and continued from the edge
-@group(0) @binding(4) var field: sampler;
+// linear, continued from the edge
 @group(0) @binding(5) var edge: sampler;
 @group(0) @binding(6) var<uniform> frame: Frame;
 @group(0) @binding(7) var<storage, read> distances: Distances;
@@ -52,7 +50,10 @@ const CUT_HALVINGS = 8u;
 // Parts that a step can be halved into.
 const PARTS = 16u;
 
-// A step is halved if it stops more than this share of light, and more or less than this share of what it would if all of it were as one
+// Where less than this passes, the rest of a step shows nothing.
+const STOPPED = 1e-5;
+
+// A step is halved if it stops more than this share of a pixel's light, and this share more or less than it would if all of it were as one
 // of its ends.
 const MOST_CHANGE = 0.125;
 
@@ -191,14 +192,15 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
     return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
 }
 
-// Whether a step has to be halved: its opacity is not that of its ends, because a surface is in it, and matters.
-fn varies(found: Segment, near: Sample, far: Sample, length: f32) -> bool {
-    if found.alpha <= MOST_CHANGE {
+// Whether a step has to be halved, through which `open` of the light comes to the eye: its opacity is not that of its ends, because a
+// surface is in it, and matters.
+fn varies(found: Segment, near: Sample, far: Sample, length: f32, open: f32) -> bool {
+    if open * found.alpha <= MOST_CHANGE {
         return false;
     }
     let passes = 1.0 - vec2(near.opacity, far.opacity);
     let ends = 1.0 - select(pow(passes, vec2(length)), vec2(0.0), passes <= vec2(0.0));
-    return any(abs(ends - found.alpha) > vec2(MOST_CHANGE));
+    return any(open * abs(ends - found.alpha) > vec2(MOST_CHANGE));
 }
 
 // View depths, a hidden and a visible one, between which a clip cuts the ray: the last halves of these.
@@ -239,6 +241,10 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     // The clip of the last cut, and the depth at which the ray came out of it.
     var cut = NO_CLIP;
     var t_cut = 0.0;
+    // Of the step so far: what passes, the colours that it stops, and depth and value, each times the share that is stopped there.
+    var open = 1.0;
+    var step_colour = vec3(0.0);
+    var step_centre = vec2(0.0);
     loop {
         let t = ray.begin + f32(n) * part;
         if !(t < ray.end) {
@@ -302,29 +308,13 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
                 // in reference lengths
                 let length = (t_to - t_from) * slant / frame.light.w;
                 let found = segment(from_sample, to_sample, length);
-                if size > 1u && varies(found, from_sample, to_sample, length) {
+                if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
                     size /= 2u;
                     continue;
                 }
-                if found.alpha > 0.0 {
-                    let t_shown = mix(t_from, t_to, found.centre);
-                    let at = Shown(
-                        start + t_shown * along,
-                        eye.origin.xyz + t_shown * ray.direction,
-                        mix(near, far, found.centre),
-                        found.colour / found.alpha,
-                        cut,
-                        (t_shown - t_cut) * slant,
-                    );
-                    colour += (1.0 - alpha) * found.alpha * shaded(at, ray.direction);
-                    alpha += (1.0 - alpha) * found.alpha;
-                    if depth == 1.0 && alpha >= 0.5 {
-                        depth = eye.depth.x + eye.depth.y / t_shown;
-                    }
-                    if ends(colour, alpha) {
-                        break;
-                    }
-                }
+                step_colour += open * found.colour;
+                step_centre += open * found.alpha * vec2(mix(t_from, t_to, found.centre), mix(near, far, found.centre));
+                open *= 1.0 - found.alpha;
             }
         }
         here = next;
@@ -333,6 +323,30 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             size = min(min(2u * size, PARTS), n & (~n + 1u));
         }
         known = true;
+        // Light is found once a step, where its share of it comes from.
+        if open < 1.0 && (n % PARTS == 0u || t_next >= ray.end || open * (1.0 - alpha) < STOPPED) {
+            let covered = 1.0 - open;
+            let t_shown = step_centre.x / covered;
+            let at = Shown(
+                start + t_shown * along,
+                eye.origin.xyz + t_shown * ray.direction,
+                step_centre.y / covered,
+                step_colour / covered,
+                cut,
+                (t_shown - t_cut) * slant,
+            );
+            colour += (1.0 - alpha) * covered * shaded(at, ray.direction);
+            alpha += (1.0 - alpha) * covered;
+            if depth == 1.0 && alpha >= 0.5 {
+                depth = eye.depth.x + eye.depth.y / t_shown;
+            }
+            if ends(colour, alpha) {
+                break;
+            }
+            step_colour = vec3(0.0);
+            step_centre = vec2(0.0);
+            open = 1.0;
+        }
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
 }

@@ -26,18 +26,23 @@ struct Frame {
     spacing: vec4<f32>,
     // unit vector towards the light; w: reference length of the opacity in mm
     light: vec4<f32>,
-    // ambient and diffuse part, what may remain of a ray's light where a level of the picture is a level of light, value of a
-    // texel of 0
+    // parts of the light, and the exponent of the highlight
     ambient: f32,
     diffuse: f32,
-    remainder: f32,
-    bias: f32,
-    // value = texel * scale + bias
-    scale: f32,
-    // 1: ambient occlusion is shown, 0: solid colour
+    specular: f32,
+    shininess: f32,
+    // 1: surfaces are lit from behind as from the front
+    two_sided: f32,
+    // 1: the ambient factor multiplies the ambient part; the other parts
     occluded: f32,
-    // the ambient factor is shown times this
+    occluded_rest: f32,
+    // it is shown times this, and at most as 1
     gain: f32,
+    // what may remain of a ray's light where a level of the picture is a level of light
+    remainder: f32,
+    // value = texel * scale + bias
+    bias: f32,
+    scale: f32,
 }
 
 fn index_of(world: vec3<f32>) -> vec3<f32> {

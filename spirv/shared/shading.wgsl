@@ -1,27 +1,12 @@
-// The light that a visible place of a ray sends towards the eye.
+// The light that a visible place of a ray sends towards the eye: ambient, Lambert's diffuse and Blinn's specular part.
+//
+//   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain V_AO, 1) where it is shown, else 1;  A' the same where it multiplies all light
+//
+// Where a surface is, d = max(n.l, 0) and s = d max(n.h, 0)^shininess; where none is, d = 1/2 and s = 0. What a surface is: `steepness`.
+// Just behind a cut or a face of the volume, n is the normal of what cut. Cost: a read, and 26 more where n is the gradient's.
 
-// Below this gradient of opacity per smallest spacing there is no surface.
-const FLAT = 1e-4;
-
-fn opacity_at(position: vec3<f32>) -> f32 {
-    return textureSampleLevel(opacity, field, (position + 0.5) / frame.dims.xyz, 0.0).r;
-}
-
-// Lambert's term of a surface seen from either side, from the gradient of the clipped opacity, so that cut faces are shaded
-// as surfaces. Where there is no gradient there is no surface, and the term is 1.
-fn surface_light(position: vec3<f32>) -> f32 {
-    let voxel = frame.spacing.xyz / min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
-    let gradient = vec3(
-        opacity_at(position + vec3(1.0, 0.0, 0.0)) - opacity_at(position - vec3(1.0, 0.0, 0.0)),
-        opacity_at(position + vec3(0.0, 1.0, 0.0)) - opacity_at(position - vec3(0.0, 1.0, 0.0)),
-        opacity_at(position + vec3(0.0, 0.0, 1.0)) - opacity_at(position - vec3(0.0, 0.0, 1.0)),
-    ) / (2.0 * voxel);
-    let steepness = length(gradient);
-    if steepness < FLAT {
-        return 1.0;
-    }
-    return abs(dot(gradient, frame.light.xyz)) / steepness;
-}
+#include "shared/gradient.wgsl"
+#include "shared/clip_normal.wgsl"
 
 // A visible place of a ray.
 struct Shown {
@@ -38,8 +23,97 @@ struct Shown {
     beside: f32,
 }
 
+// Voxels of way behind a cut to which its normal holds, and from which the gradient's does. A step may end a quarter behind it.
+const CUT_HOLDS = 0.25;
+const CUT_ENDS = 0.75;
+
+// Relative change of opacity over a voxel below which there is no surface, and above which there is: what noise of a level or two
+// of 255 makes of half opacity, and what an edge of some ten voxels has.
+const NO_SURFACE = 0.02;
+const SURFACE = 0.2;
+
+// Mean of |n.l| over all directions: Lambert's term of what has none.
+const NO_DIRECTION = 0.5;
+
+// The diffuse and the specular part of the light that comes back from a surface, by the share of it that is turned to the front and to
+// the back of its normal.
+fn reflected(normal: vec3<f32>, front: f32, back: f32, towards_eye: vec3<f32>) -> vec2<f32> {
+    let light = frame.light.xyz;
+    let slope = dot(normal, light);
+    let arriving = max(front * slope, -back * slope);
+    let half_way = light + towards_eye;
+    // An eye that looks into the light has no half way.
+    let mirrored = min(abs(dot(normal, half_way)) / max(length(half_way), 1e-6), 1.0);
+    // Light from behind the surface that the eye sees does not mirror.
+    let same_side = slope * dot(normal, half_way) > 0.0;
+    return vec2(arriving, select(0.0, arriving * pow(mirrored, frame.shininess), same_side));
+}
+
+// The same of a place inside the volume, by the gradient of the values. Opacity a voxel before and behind it along the gradient
+// says how much of a surface there is, relative to the largest of the three, and which side is out: a ridge has two.
+fn reflected_inside(at: Shown, towards_eye: vec3<f32>) -> vec2<f32> {
+    let gradient = texel_gradient(at.position) / frame.spacing.xyz;
+    let rise = length(gradient);
+    let none = vec2(NO_DIRECTION, 0.0);
+    if !(rise > 0.0) {
+        return none;
+    }
+    let normal = gradient / rise;
+    let spacing = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
+    let voxel = normal * spacing / frame.spacing.xyz;
+    let here = opacity_of(at.value);
+    let before = opacity_of(value_at(at.position - voxel));
+    let behind = opacity_of(value_at(at.position + voxel));
+    let change = abs(before - here) + abs(behind - here);
+    if !(change > 0.0) {
+        return none;
+    }
+    let surface = smoothstep(NO_SURFACE, SURFACE, change / max(here, max(before, behind)));
+    // -1 ... 1: out is against the gradient, both ways, along it.
+    let out = (before - behind) / change;
+    let lit_back = max(1.0 - max(out, 0.0), frame.two_sided);
+    let lit_front = max(1.0 + min(out, 0.0), frame.two_sided);
+    return mix(none, reflected(normal, lit_front, lit_back, towards_eye), surface);
+}
+
+// The same at any place.
+fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
+    let towards_eye = -normalize(direction);
+    let along = direction / frame.spacing.xyz;
+    // The face of the volume through which the ray came in, and the way since then.
+    let face = select(frame.dims.xyz - 0.5, vec3(-0.5), along > vec3(0.0));
+    let since = select((at.position - face) / along, vec3(1e30), along == vec3(0.0));
+    let entered = min(since.x, min(since.y, since.z)) * length(direction);
+    let by_clip = at.cut != NO_CLIP && at.beside <= entered;
+    let voxel = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
+    let cut = 1.0 - smoothstep(CUT_HOLDS * voxel, CUT_ENDS * voxel, select(entered, at.beside, by_clip));
+    var reflected_cut = vec2(0.0);
+    if cut > 0.0 {
+        var normal = vec3(0.0);
+        if by_clip {
+            normal = clip_normal(at.cut, at.world + at.beside * towards_eye, towards_eye);
+        } else {
+            // Of two faces that meet, both: their edge has no direction of its own.
+            normal = normalize(-sign(direction) * vec3<f32>(since <= vec3(min(since.x, min(since.y, since.z)))));
+        }
+        reflected_cut = reflected(normal, 1.0, frame.two_sided, towards_eye);
+    }
+    if cut == 1.0 {
+        return reflected_cut;
+    }
+    return mix(reflected_inside(at, towards_eye), reflected_cut, cut);
+}
+
 // Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
 fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
-    let light = frame.ambient + frame.diffuse * surface_light(at.position);
-    return light * mix(1.0, frame.gain * ambient_at(at.position), frame.occluded) * at.colour;
+    var back = vec2(0.0);
+    if frame.diffuse + frame.specular > 0.0 {
+        back = reflected_at(at, direction) * vec2(frame.diffuse, frame.specular);
+    }
+    var open = 1.0;
+    if frame.occluded > 0.0 {
+        open = min(frame.gain * ambient_at(at.position), 1.0);
+    }
+    let open_rest = mix(1.0, open, frame.occluded_rest);
+    return (open * frame.ambient + open_rest * back.x) * at.colour + open_rest * back.y;
 }

@@ -49,10 +49,16 @@
 //!     background = "#17191d"
 //!
 //!     [shading]
-//!     ambient = 0.6                    # light from everywhere
-//!     diffuse = 0.6                    # light that depends on the gradient
-//!     light = [-0.4, -0.7, 0.6]        # direction towards it
-//!     occlusion = true                 # false: the picture without ambient occlusion
+//!     mode = "phong+ao"                # none: colours alone; phong: without ambient occlusion; ao: colours times the ambient factor
+//!     ambient = 0.5                    # light from everywhere
+//!     diffuse = 0.6                    # light that depends on the surface's direction
+//!     specular = 0.15                  # white light that surfaces reflect towards the eye
+//!     shininess = 24                   # its exponent: the larger, the smaller the highlight
+//!     two_sided = false                # true: surfaces are lit from behind as from the front
+//!     light = [-0.5, 0.6, 0.7]         # direction towards it: of the head right, up, backwards; of the world x, y, z
+//!     light_from = "head"              # or "world"
+//!     occlusion = "ambient"            # the light that the ambient factor multiplies; "all", as the paper's pictures
+//!     gain = 2                         # the ambient factor is shown times this, and at most as 1; a flat wall's is 1/2
 //!     "##,
 //!     std::path::Path::new("."),
 //! )?;
@@ -73,7 +79,7 @@ use crate::{Error, Result, file, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::error::{quoted, shown_path};
 use cao_model::frame::Frame;
-use cao_model::look::Look;
+use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::{Scope, Setup};
@@ -476,10 +482,16 @@ struct ImageFile {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 struct ShadingFile {
+    mode: Option<String>,
     ambient: Option<f64>,
     diffuse: Option<f64>,
+    specular: Option<f64>,
+    shininess: Option<f64>,
+    two_sided: Option<bool>,
     light: Option<[f64; 3]>,
-    occlusion: Option<bool>,
+    light_from: Option<String>,
+    occlusion: Option<Value>,
+    gain: Option<f64>,
 }
 
 fn volume(value: Value, base: &Path) -> Result<(VolumeSource, Reading)> {
@@ -757,7 +769,12 @@ impl ImageFile {
 impl ShadingFile {
     fn read(self) -> Result<Look> {
         let default = Look::default();
-        for (key, value) in [("shading.ambient", self.ambient), ("shading.diffuse", self.diffuse)] {
+        for (key, value) in [
+            ("shading.ambient", self.ambient),
+            ("shading.diffuse", self.diffuse),
+            ("shading.specular", self.specular),
+            ("shading.gain", self.gain),
+        ] {
             if let Some(share) = value.filter(|share| !(0.0..=10.0).contains(share)) {
                 return Err(Error::refused(key, format!("{share}: expected a number from 0 to 10")));
             }
@@ -771,13 +788,37 @@ impl ShadingFile {
                 )
             })?,
         };
-        Ok(Look {
-            ambient: self.ambient.map_or(default.ambient, |share| share as f32),
-            diffuse: self.diffuse.map_or(default.diffuse, |share| share as f32),
+        let refused = |key: &'static str| move |error| Error::from(error).renamed(key);
+        let occluded = match &self.occlusion {
+            None => default.occluded,
+            Some(Value::String(name)) => Occluded::parse(name).map_err(refused("shading.occlusion"))?,
+            Some(other) => {
+                let problem = format!(
+                    "{}: expected \"ambient\" or \"all\"; a picture without it has mode = \"phong\"",
+                    shown(other)
+                );
+                return Err(Error::refused("shading.occlusion", problem));
+            }
+        };
+        let shading =
+            self.mode.as_deref().map(Shading::parse).transpose().map_err(refused("shading.mode"))?;
+        let light_from = self.light_from.as_deref().map(LightFrom::parse).transpose();
+        let part = |given: Option<f64>, default| given.map_or(default, |share| share as f32);
+        let look = Look {
+            shading: shading.unwrap_or(default.shading),
+            ambient: part(self.ambient, default.ambient),
+            diffuse: part(self.diffuse, default.diffuse),
+            specular: part(self.specular, default.specular),
+            shininess: part(self.shininess, default.shininess),
+            two_sided: self.two_sided.unwrap_or(default.two_sided),
             light,
-            occluded: self.occlusion.unwrap_or(default.occluded),
+            light_from: light_from.map_err(refused("shading.light_from"))?.unwrap_or(default.light_from),
+            occluded,
+            gain: part(self.gain, default.gain),
             ..default
-        })
+        };
+        look.check()?;
+        Ok(look)
     }
 }
 

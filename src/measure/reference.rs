@@ -243,12 +243,13 @@ pub struct ImageReference {
 }
 
 /// The image reference: the ray cast of [`cao_twin::draw::raycast`] with the plan's steps on the smallest spacing, the ambient
-/// factor of each of its samples evaluated by the ambient integral around that very point. For small images: every sample of
+/// factor of each of its samples evaluated by the ambient integral of `opacity`, V_o, around that very point. For small images: every sample of
 /// every ray costs what a voxel costs. The frame's own `ambient` and `step_mm` are not used. Uses the device's queue and waits for it.
 #[expect(clippy::too_many_arguments, reason = "scene, lengths and settings, each named once")]
 pub fn image(
     gpu: &Gpu,
     frame: &Frame,
+    opacity: &[f32],
     view: &View,
     size: [usize; 2],
     radius_mm: f64,
@@ -257,7 +258,7 @@ pub fn image(
     progress: &mut dyn FnMut(f64),
 ) -> Result<ImageReference> {
     let kernel = Kernel::new(gpu)?;
-    let scene = Scene::new(gpu, &kernel, &frame.grid, frame.opacity)?;
+    let scene = Scene::new(gpu, &kernel, &frame.grid, opacity)?;
     let smallest = frame.grid.min_spacing();
     let integral = integral(radius_mm, offset_mm, &frame.grid, plan)?;
     let fine = Frame { step_mm: smallest / f64::from(plan.steps_per_voxel), ..*frame };

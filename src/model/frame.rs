@@ -5,7 +5,7 @@
 //! before they reach a renderer, which knows nothing of it.
 
 use crate::clip::{Clip, Pose};
-use crate::look::Look;
+use crate::look::{LightFrom, Look};
 use crate::view::StereoRig;
 use crate::volume::{Space, Volume};
 use crate::{Error, Result};
@@ -131,9 +131,12 @@ impl Turn {
         }
     }
 
-    /// The light.
+    /// The light; the head's is turned with the eyes.
     pub fn look(self, look: &Look) -> Look {
-        Look { light: self.vector(look.light), ..*look }
+        match look.light_from {
+            LightFrom::Head => *look,
+            LightFrom::World => Look { light: self.vector(look.light), ..*look },
+        }
     }
 }
 

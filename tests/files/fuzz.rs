@@ -134,9 +134,13 @@ height = 48
 step_mm = 0.5
 background = "#17191d"
 [shading]
+mode = "phong+ao"
 ambient = 0.6
+shininess = 20
+two_sided = true
 light = [-0.4, -0.7, 0.6]
-occlusion = true
+light_from = "world"
+occlusion = "all"
 "##;
 const TRANSFER: &str = r##"reference_mm = 1.5
 opacity = [[-1000, 0.0], [0.5, 0.25], [1e3, 1.0]]

@@ -6,6 +6,7 @@ use cao_formats::Error;
 use cao_formats::scene::{Scene, TransferSource, Viewpoint, VolumeSource};
 use cao_model::clip::{Mode, Shape};
 use cao_model::frame::Frame;
+use cao_model::look::{LightFrom, Occluded, Shading};
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Quadrature, RaySet};
@@ -104,7 +105,8 @@ fn every_setting_arrives() {
          [stereo]\nposition_mm = [0, -100, 0]\ntarget_mm = [0, 10, 0]\nup = [1, 0, 0]\nipd_mm = 0\nfov_deg = 60\n\
          screen_mm = 50\n\
          [image]\nwidth = 320\nheight = 200\nstep_mm = 0.5\nbackground = [1, 1, 1]\n\
-         [shading]\nambient = 1\ndiffuse = 0\nlight = [0, 0, 2]\nocclusion = false",
+         [shading]\nambient = 1\ndiffuse = 0\nlight = [0, 0, 2]\nmode = \"phong\"\n\
+         specular = 0.5\nshininess = 9\ntwo_sided = true\nlight_from = \"world\"\nocclusion = \"all\"\ngain = 3",
     );
     assert_eq!(scene.transfer, TransferSource::Preset("mr".into()));
     let o = scene.occlusion.setup(1.0).unwrap().occlusion;
@@ -117,7 +119,9 @@ fn every_setting_arrives() {
     assert_eq!((scene.image.width, scene.image.height, scene.look.step_mm), (320, 200, Some(0.5)));
     assert_eq!(scene.image.background, [1.0; 3]);
     let s = scene.look;
-    assert_eq!((s.ambient, s.diffuse, s.light, s.occluded), (1.0, 0.0, Vec3::Z, false));
+    assert_eq!((s.ambient, s.diffuse, s.light, s.shading), (1.0, 0.0, Vec3::Z, Shading::Phong));
+    assert_eq!((s.specular, s.shininess, s.two_sided, s.gain), (0.5, 9.0, true, 3.0));
+    assert_eq!((s.light_from, s.occluded), (LightFrom::World, Occluded::All));
     // A number names a ray set as its text does.
     assert_eq!(with("[occlusion]\nrays = 54").occlusion.rays, RaySet::R54);
 }
@@ -229,7 +233,7 @@ fn unknown_keys_are_refused_by_name_and_line() {
         ("[[clip]]\nshape = \"box\"\nsize = 3", "size", 4),
         ("[stereo]\neyes = 2", "eyes", 3),
         ("[image]\nsize = 3", "size", 3),
-        ("[shading]\nspecular = 1", "specular", 3),
+        ("[shading]\nglossy = 1", "glossy", 3),
     ] {
         let found = read(&format!("{ENGINE}{text}")).unwrap_err().to_string();
         assert!(found.contains(&format!("unknown field `{key}`, expected")), "{found}");
@@ -299,6 +303,14 @@ fn impossible_values_are_refused_by_name() {
         ("[image]\nbackground = \"black\"", "image.background: \"black\": expected \"#rrggbb\""),
         ("[shading]\nambient = -1", "shading.ambient: -1: expected a number from 0 to 10"),
         ("[shading]\ndiffuse = nan", "shading.diffuse: NaN: expected a number from 0 to 10"),
+        ("[shading]\nshininess = 0", "shading.shininess: 0; expected a number from 1 to 10000"),
+        ("[shading]\nmode = \"solid\"", "shading.mode: \"solid\"; expected none, phong, ao or phong+ao"),
+        ("[shading]\nlight_from = \"hand\"", "shading.light_from: \"hand\"; expected head or world"),
+        ("[shading]\nocclusion = \"none\"", "shading.occlusion: \"none\"; expected ambient or all"),
+        (
+            "[shading]\nocclusion = false",
+            "shading.occlusion: false: expected \"ambient\" or \"all\"; a picture without",
+        ),
         ("[shading]\nlight = [0, 0, 0]", "shading.light: [0.0, 0.0, 0.0]: expected a direction"),
     ] {
         let found = read(&format!("{ENGINE}{text}")).unwrap_err().to_string();

@@ -19,7 +19,7 @@ use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKin
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
-use cao_model::look::Look;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::AntiAliasing;
@@ -72,7 +72,7 @@ fn setup(maps: MapSettings) -> Setup {
 
 const MAPS: MapSettings = MapSettings { resolution: 96, cells: 32, pairs: 4, literal: false };
 
-/// Both eyes of the renderer's scene by the twin, from the device's own V_o and V_AO.
+/// Both eyes of the renderer's scene by the twin, from the device's own V_AO.
 fn twin(
     renderer: &Renderer,
     volume: &Volume,
@@ -83,7 +83,7 @@ fn twin(
 ) -> [twin::draw::raycast::Image; 2] {
     let grid = grid_of(volume);
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
-    let (opacity, ambient) = (renderer.read_opacity().unwrap(), renderer.read_ambient().unwrap());
+    let ambient = renderer.read_ambient().unwrap();
     let reach = renderer.setup().occlusion.reach(grid.min_spacing());
     let maps = Maps { layers: 4, resolution: MAPS.resolution, dilation: Dilation::Conservative(MAPS.cells) };
     let fields: Vec<_> =
@@ -93,11 +93,10 @@ fn twin(
         values: &values,
         transfer,
         reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
-        opacity: &opacity,
         ambient: &ambient,
         clips: &fields,
         step_mm: f64::from(look.step_mm.unwrap()),
-        look: Look { light: look.light.normalize(), ..*look },
+        look: *look,
     };
     [0, 1].map(|eye| twin::draw::raycast::raycast(&frame, &views[eye], SIZE.map(|s| s as usize)))
 }
@@ -190,7 +189,11 @@ fn pictures_are_those_of_the_twin() {
         renderer.set_clips(&clips).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         for turn in 0..3 {
-            let look = Look { step_mm: Some([0.5, 0.35, 0.8][turn]), occluded: turn != 2, ..Look::default() };
+            let look = Look {
+                step_mm: Some([0.5, 0.35, 0.8][turn]),
+                shading: if turn == 2 { Shading::Phong } else { Shading::PhongAo },
+                ..Look::default()
+            };
             let views = framing(&volume, -30.0 + 70.0 * (turn + n) as f32, 35.0 - 20.0 * turn as f32);
             let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
             let expected = twin(&renderer, &volume, &transfer, &clips, &views, &look);
@@ -488,7 +491,6 @@ impl Stages {
         let bindings = Bindings {
             field: &self.field,
             transfer: &self.transfer,
-            opacity: &self.volumes.full_opacity,
             ambient: &self.volumes.ambient,
             distances: &distances,
             clips: &self.clips,
@@ -670,7 +672,12 @@ fn a_ray_that_ends_early_changes_no_pixel_by_more_than_half_a_level() {
         for turn in 0..3 {
             let views = framing(&volume, 70.0 * turn as f32, 35.0 - 30.0 * turn as f32);
             let draw = |tolerance| {
-                let look = Look { tolerance, occluded: turn != 2, step_mm: Some(0.3), ..Look::default() };
+                let look = Look {
+                    tolerance,
+                    shading: if turn == 2 { Shading::Phong } else { Shading::PhongAo },
+                    step_mm: Some(0.3),
+                    ..Look::default()
+                };
                 renderer.draw(&views, &look, SIZE).unwrap().0
             };
             let whole = draw(0.0);

@@ -213,7 +213,6 @@ impl Scene {
             values: &self.values,
             transfer: &self.transfer,
             reference_mm: 1.0,
-            opacity: &self.opacity,
             ambient,
             clips: &[],
             step_mm,
@@ -229,8 +228,18 @@ impl Scene {
         steps_per_voxel: u32,
     ) -> reference::ImageReference {
         let plan = Plan { directions, steps_per_voxel, max_voxels: usize::MAX };
-        reference::image(gpu, &self.frame(&[], 1.0), &self.view, SIZE, radius_mm, 0.5, &plan, &mut |_| ())
-            .unwrap()
+        reference::image(
+            gpu,
+            &self.frame(&[], 1.0),
+            &self.opacity,
+            &self.view,
+            SIZE,
+            radius_mm,
+            0.5,
+            &plan,
+            &mut |_| (),
+        )
+        .unwrap()
     }
 }
 

@@ -346,7 +346,7 @@ fn volumes_are_drawn_with_flags_alone_also_negative_ones_and_the_smallest() {
     folder.ok(&format!(
         "render builtin:fruit:12 {small} --azimuth 150 --elevation -10 --distance 60 --ipd 0 {clip} -o b.png"
     ));
-    folder.ok(&format!("render builtin:fruit:12 {small} {look} {clip} --solid -o s.png"));
+    folder.ok(&format!("render builtin:fruit:12 {small} {look} {clip} --shading phong -o s.png"));
     assert_eq!(folder.list(), ["b.png", "l.png", "r.png", "s.png"]);
     let solid = picture(&folder, "s.png");
     let light = |p: &image::RgbImage| p.pixels().map(|p| u32::from(p.0[1])).sum::<u32>();

@@ -132,7 +132,7 @@ fn clips_light_and_eyes_of_flags_and_scenes_are_on_the_axes_of_the_patient() {
         // The picture of a ball is that of its light, which comes from a side that no axis of the oblique grid has.
         folder.put("one.nii", balls(rotation, &[DVec3::ZERO]).in_order(LAS).nifti());
         let eyes = "[stereo]\nposition_mm = [0, -25, 0]\n";
-        let light = "[shading]\nlight = [1, 0, 0]\nambient = 0.1\n";
+        let light = "[shading]\nlight = [1, 0, 0]\nlight_from = \"world\"\nambient = 0.1\n";
         folder.put("lit.toml", format!("volume = \"one.nii\"\n{eyes}{light}"));
         let picture = draw(&folder, "lit.toml", "");
         let straight = lit.get_or_insert_with(|| picture.clone());

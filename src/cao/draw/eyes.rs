@@ -5,7 +5,7 @@ use crate::field::Field;
 use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
 use cao_kernels::shared::eyes::{Eye, Frame, MOST_VIEWS};
-use cao_model::look::Look;
+use cao_model::look::{Look, Occluded};
 use cao_model::view::View;
 use glam::{Vec2, Vec3};
 
@@ -89,14 +89,18 @@ impl FrameBuffer {
         }
         data.dims = [field.dims[0] as f32, field.dims[1] as f32, field.dims[2] as f32, 0.0];
         data.spacing = [field.spacing[0], field.spacing[1], field.spacing[2], step];
-        data.light = look.light.normalize().extend(reference_mm).to_array();
-        data.ambient = look.ambient;
-        data.diffuse = look.diffuse;
+        // The first view is the head, so that all views see the same light.
+        data.light = look.towards_light(views[0].orientation).extend(reference_mm).to_array();
+        [data.ambient, data.diffuse, data.specular] = look.parts();
+        data.shininess = look.shininess;
+        let flag = |on| f32::from(u8::from(on));
+        data.two_sided = flag(look.two_sided);
+        data.occluded = flag(look.shading.occluded());
+        data.occluded_rest = flag(look.shading.occluded() && look.occluded == Occluded::All);
+        data.gain = look.gain;
         data.remainder = look.remainder();
         data.bias = field.bias;
         data.scale = field.scale;
-        data.occluded = f32::from(u8::from(look.occluded));
-        data.gain = look.gain;
         rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);

@@ -1,7 +1,7 @@
 //! Stage 6 of CAO §3.5: all views by ray casting, in one dispatch, an invocation a pixel, into a layer each of a picture.
 //!
-//! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i c_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, `L = A(x)·(k_a + k_d |n·l|)`. In: `volume`, `transfer`,
-//! `opacity` V_o (gradients), `ambient` V_AO, `distances`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
+//! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, L by `spirv/shared/shading.wgsl`. In: `volume`, `transfer`,
+//! `ambient` V_AO, `distances`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
 //! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
 
 use crate::Result;
@@ -21,8 +21,6 @@ pub struct Bindings<'a> {
     pub field: &'a Field,
     /// Transfer function.
     pub transfer: &'a TransferBuffer,
-    /// V_o, clipped.
-    pub opacity: &'a Image,
     /// V_AO.
     pub ambient: &'a Image,
     /// How far rays may leap.
@@ -37,7 +35,6 @@ pub struct Bindings<'a> {
 pub struct Raycast {
     pipeline: Pipeline,
     by_hand: u32,
-    field: Sampler,
     edge: Sampler,
 }
 
@@ -48,7 +45,6 @@ impl Raycast {
         Ok(Self {
             by_hand: u32::from(coarse),
             pipeline: gpu.compute(&kernel::SHADER, "main")?,
-            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
         })
     }
@@ -62,9 +58,7 @@ impl Raycast {
         let binds = kernel::MainBindings {
             volume: &b.field.volume,
             transfer: &b.transfer.buffer,
-            opacity: b.opacity,
             ambient: b.ambient,
-            field: &self.field,
             edge: &self.edge,
             frame: &b.frame.buffer,
             distances: b.distances,

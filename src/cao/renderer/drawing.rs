@@ -49,7 +49,6 @@ impl Renderer {
         let bindings = Bindings {
             field: &subject.field,
             transfer: &subject.transfer_buffer,
-            opacity: fields.opacity,
             ambient: fields.ambient,
             distances: &self.distances,
             clips: &subject.clip_set,

@@ -8,6 +8,7 @@ use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
 use cao_model::error::shown_path;
 use cao_model::frame::Frame;
+use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
@@ -151,6 +152,13 @@ pub struct Budget {
     pub budget_ms: Option<f64>,
 }
 
+impl Budget {
+    /// Whether there is one.
+    pub fn given(&self) -> bool {
+        self.budget_error.is_some() || self.budget_ms.is_some()
+    }
+}
+
 fn budget(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -187,9 +195,13 @@ pub struct Render {
     /// Distance between the eyes in mm [default: 1/15 of that distance]
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
-    /// Draw without ambient occlusion
-    #[arg(long, conflicts_with_all = ["budget_error", "budget_ms"])]
-    pub solid: bool,
+    /// Light that is shown: none, the colours alone; phong, ambient, diffuse and specular; ao, colours times ambient occlusion; phong+ao,
+    /// both [default: the scene's, phong+ao]
+    #[arg(long, value_name = "LIGHT", value_parser = |s: &str| Shading::parse(s))]
+    pub shading: Option<Shading>,
+    /// What the light's direction is fixed to: head, world [default: the scene's, head]
+    #[arg(long, value_name = "head|world", value_parser = |s: &str| LightFrom::parse(s))]
+    pub light_from: Option<LightFrom>,
     #[command(flatten)]
     pub settings: Settings,
     #[command(flatten)]

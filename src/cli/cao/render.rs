@@ -40,7 +40,12 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
     let look = turn.look(&scene.look);
-    if !look.occluded {
+    if !look.shading.occluded() {
+        if args.budget.given() {
+            return Err(usage(
+                "--budget-error, --budget-ms: they choose an occlusion, and --shading or the scene shows none",
+            ));
+        }
         // What is not shown is not computed: without a neighbourhood nothing is occluded.
         setup.occlusion.radius_mm = 0.0;
     }
@@ -119,7 +124,8 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
         };
     }
     scene.stereo.ipd_mm = args.ipd.or(scene.stereo.ipd_mm);
-    scene.look.occluded &= !args.solid;
+    scene.look.shading = args.shading.unwrap_or(scene.look.shading);
+    scene.look.light_from = args.light_from.unwrap_or(scene.look.light_from);
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! The ways to draw a frame that are compared: how each sets up a renderer and lights its samples.
 
 use cao_model::METHODS;
-use cao_model::look::Look;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::settings::{MapSettings, Setup};
 use std::fmt;
@@ -49,7 +49,7 @@ impl Way {
     pub fn setup(self, shared: Setup) -> Setup {
         let mut setup = shared;
         match self {
-            // What is not shown is not computed: without a neighbourhood nothing is occluded. So does `cao render --solid`.
+            // What is not shown is not computed: without a neighbourhood nothing is occluded. So does `cao render --shading phong`.
             Self::Solid => setup.occlusion.radius_mm = 0.0,
             Self::By(method) => setup.method = method,
             Self::CaoLiteral => {
@@ -67,7 +67,8 @@ impl Way {
 
     /// How samples are lit.
     pub fn look(self) -> Look {
-        Look { occluded: self != Self::Solid, ..Look::default() }
+        let shading = if self == Self::Solid { Shading::Phong } else { Shading::PhongAo };
+        Look { shading, ..Look::default() }
     }
 }
 

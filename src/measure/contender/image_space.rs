@@ -12,7 +12,7 @@ use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_gpu::{
     Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage, Timings,
 };
-use cao_model::look::Look;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
 
@@ -137,7 +137,7 @@ impl Contender for ImageSpace<'_> {
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        let look = Look { occluded: false, ..*look };
+        let look = Look { shading: Shading::Phong, ..*look };
         let (mut image, timings) = self.renderer.draw(self.arena.views, &look, self.arena.size)?;
         for eye in 0..2 {
             // The picture's own gain, for what is half of the data-space values.

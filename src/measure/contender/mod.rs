@@ -15,7 +15,7 @@ use crate::Result;
 use cao::renderer::StereoImage;
 use cao_gpu::{Gpu, Timings};
 use cao_model::clip::Clip;
-use cao_model::look::Look;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::transfer::TransferFunction;
@@ -209,7 +209,7 @@ pub struct Entrant {
 
 /// How a frame is drawn whose depth stands for the surface: without noise, so that it is the same each time.
 pub fn surface_look() -> Look {
-    Look { occluded: false, ..Look::default() }
+    Look { shading: Shading::None, ..Look::default() }
 }
 
 /// What opens a contender.

@@ -5,7 +5,7 @@ use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values};
 use crate::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_gpu::Timings;
-use cao_model::look::Look;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
 
@@ -51,7 +51,7 @@ impl Contender for Solid<'_> {
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        let look = Look { occluded: false, ..*look };
+        let look = Look { shading: Shading::Phong, ..*look };
         Ok(self.renderer.draw(self.arena.views, &look, self.arena.size)?)
     }
 }

@@ -176,7 +176,6 @@ fn pictures(
         values: &values,
         transfer: &cut.transfer,
         reference_mm: 1.0,
-        opacity,
         ambient,
         clips: &clips,
         step_mm: 1.0 / f64::from(truth::Plan::QUICK.steps_per_voxel),
@@ -184,8 +183,17 @@ fn pictures(
     };
     let ([view, _], size) = (cut.views()?, [plan.pixels; 2]);
     let radius = f64::from(RADIUS);
-    let expected =
-        image(gpu, &frame(ambient[1]), &view, size, radius, offset, &truth::Plan::QUICK, &mut |_| ())?;
+    let expected = image(
+        gpu,
+        &frame(ambient[1]),
+        opacity,
+        &view,
+        size,
+        radius,
+        offset,
+        &truth::Plan::QUICK,
+        &mut |_| (),
+    )?;
     // The face's pixels: those that stop their light within a voxel of it.
     let world = cut.grid.to_world([x, 0.0, 0.0])[0] as f32;
     let face = Vec3::new(world, 0.0, 0.0);

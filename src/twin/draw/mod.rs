@@ -1,6 +1,7 @@
 //! Pictures.
 
 pub mod brick_distance;
+pub mod clip_normal;
 pub mod raycast;
 pub mod segment;
 pub mod shading;

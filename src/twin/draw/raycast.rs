@@ -4,17 +4,17 @@
 //!
 //! ```text
 //! α_k = 1 − exp ∫ ln(1 − TF_o(V)) dt/ℓ,  over the part of the segment that no clip hides
-//! C  += (1 − A) α_k · c_k · 2 V_AO(p_k) · (ambient + diffuse |n·l|)
+//! C  += (1 − A) α_k · L(c_k, p_k)                                         L: shading.rs
 //! A  += (1 − A) α_k                                                         until (1 − A)·L·E′(C) ≤ ½/255
 //! ```
 //!
-//! where c_k is the segment's mean colour and p_k where its light comes from. A segment that stops more light than its ends alone say is
-//! halved, up to four times. L is the brightest light there is and E′ the slope of sRGB coding at the darkest component: what remains cannot change an
-//! 8-bit pixel by more than half a level. n is the direction of the gradient of the clipped opacity V_o, so that cut faces are shaded as surfaces.
+//! where c_k is the segment's mean colour and p_k where its light comes from; the last L is the brightest light there is and E′ the slope
+//! of sRGB coding at the darkest component: what remains cannot change an 8-bit pixel by more than half a level. A segment that stops
+//! more light than its ends alone say is halved, up to four times.
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::segment::{segment, varies};
-use crate::draw::shading::{GAIN, Shown, shaded};
+use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
 use cao_kernels::raycast as kernel;
 use cao_model::look::Look;
@@ -39,15 +39,13 @@ pub struct Frame<'a> {
     pub transfer: &'a TransferFunction,
     /// Length ℓ in mm that opacities are for.
     pub reference_mm: f64,
-    /// V_o, opacity after clipping.
-    pub opacity: &'a [f32],
     /// V_AO, ambient factor.
     pub ambient: &'a [f32],
     /// Clips.
     pub clips: &'a [ClipField],
     /// Distance Δt of samples in mm.
     pub step_mm: f64,
-    /// Light.
+    /// Light; where it is the head's, each view is a head.
     pub look: Look,
 }
 
@@ -125,11 +123,13 @@ fn pixel(
     let at = |t: f64| frame.grid.to_index((origin + t * direction).to_array());
     let value_at = |t: f64| trilinear_clamped(&frame.grid, frame.values, at(t)) as f32;
     let shown_at = |t: f64| visible(frame.clips, (origin + t * direction).as_vec3());
-    let light = f64::from(frame.look.ambient) + f64::from(frame.look.diffuse);
-    // A white background, or a white sample that faces the light.
-    let brightest = 1.0_f64.max(light * if frame.look.occluded { GAIN } else { 1.0 });
+    // A white background, or a white sample that faces the light and mirrors it.
+    let brightest = 1.0_f64.max(frame.look.parts().iter().sum::<f32>().into());
+    let light = frame.look.towards_light(view.orientation).as_dvec3();
     let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
     let (mut clip, mut cut_at) = (None, 0.0);
+    // Of the step so far: what passes, the colours that it stops, and place and value, each times the share that is stopped there.
+    let (mut open, mut step_colour, mut step_place, mut step_value) = (1.0, DVec3::ZERO, 0.0, 0.0);
     // Parts of steps so far, and of the next one.
     let (mut n, mut size) = (0, PARTS);
     let place = |n: u64| begin + n as f64 * frame.step_mm / PARTS as f64;
@@ -151,29 +151,41 @@ fn pixel(
             let values = [from, to].map(value_at);
             let length = (to - from) / frame.reference_mm;
             let found = segment(frame.transfer, values[0], values[1], length);
-            if size > 1 && varies(frame.transfer, &found, values[0], values[1], length) {
+            if size > 1 && varies(frame.transfer, &found, values, length, open * (1.0 - alpha)) {
                 size /= 2;
                 continue;
             }
-            if found.alpha > 0.0 {
-                let t = from + found.centre * (to - from);
-                let value = values[0] + found.centre as f32 * (values[1] - values[0]);
-                let world = origin + t * direction;
-                let tint = found.colour / found.alpha;
-                let shown =
-                    Shown { position: at(t), world, value, colour: tint, cut: clip, beside: t - cut_at };
-                colour += (1.0 - alpha) * found.alpha * shaded(frame, &shown, direction, ambient);
-                alpha += (1.0 - alpha) * found.alpha;
-                if depth == 1.0 && alpha >= 0.5 {
-                    depth = vulkan_depth(view, t / slant);
-                }
-                if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
-                    break;
-                }
-            }
+            step_colour += open * found.colour;
+            step_place += open * found.alpha * (from + found.centre * (to - from));
+            let value = f64::from(values[0]) + found.centre * f64::from(values[1] - values[0]);
+            step_value += open * found.alpha * value;
+            open *= 1.0 - found.alpha;
         }
         n += size;
         size = (2 * size).min(PARTS).min(1 << n.trailing_zeros());
+        // Light is found once a step, where its share of it comes from.
+        let stopped = open * (1.0 - alpha) < f64::from(kernel::STOPPED);
+        if open < 1.0 && (n % PARTS == 0 || stopped || place(n) >= end) {
+            let covered = 1.0 - open;
+            let t = step_place / covered;
+            let shown = Shown {
+                position: at(t),
+                world: origin + t * direction,
+                value: (step_value / covered) as f32,
+                colour: step_colour / covered,
+                cut: clip,
+                beside: t - cut_at,
+            };
+            colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, light, ambient);
+            alpha += (1.0 - alpha) * covered;
+            if depth == 1.0 && alpha >= 0.5 {
+                depth = vulkan_depth(view, t / slant);
+            }
+            if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
+                break;
+            }
+            (open, step_colour, step_place, step_value) = (1.0, DVec3::ZERO, 0.0, 0.0);
+        }
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
 }
@@ -229,9 +241,9 @@ mod tests {
     use crate::clip::classify::tests::{field, random_clip, shapes};
     use crate::random::Random;
     use cao_model::clip::{Clip, Mode, Pose, Shape};
+    use cao_model::look::{LightFrom, Occluded, Shading};
     use cao_model::view::{StereoRig, Tangents};
-    use glam::Quat;
-    use glam::Vec3;
+    use glam::{Quat, Vec3};
 
     /// One opacity for every value, colour by value.
     fn even(opacity: f32) -> TransferFunction {
@@ -243,7 +255,6 @@ mod tests {
         grid: Grid,
         values: Vec<f32>,
         transfer: TransferFunction,
-        opacity: Vec<f32>,
         ambient: Vec<f32>,
         clips: Vec<ClipField>,
         look: Look,
@@ -256,14 +267,15 @@ mod tests {
                 grid,
                 values: vec![0.0; grid.len()],
                 transfer: even(opacity),
-                opacity: vec![opacity; grid.len()],
                 ambient: vec![0.5; grid.len()],
                 clips: Vec::new(),
                 look: Look {
                     ambient: 0.25,
                     diffuse: 0.5,
+                    specular: 0.0,
                     light: Vec3::new(0.0, 0.6, 0.8),
-                    occluded: true,
+                    light_from: LightFrom::World,
+                    occluded: Occluded::All,
                     ..Look::default()
                 },
             }
@@ -275,7 +287,6 @@ mod tests {
                 values: &self.values,
                 transfer: &self.transfer,
                 reference_mm: 1.0,
-                opacity: &self.opacity,
                 ambient: &self.ambient,
                 clips: &self.clips,
                 step_mm,
@@ -361,7 +372,7 @@ mod tests {
         assert!(covered > 50 && covered < image.depth.len() - 50, "{covered}");
     }
 
-    /// On the upper face the gradient is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
+    /// On the upper face the normal is along z and the ambient factor ½, shown at full light: colour · 2·½ · (¼ + ½ · 0.8).
     #[test]
     fn colour_is_shaded_by_ambient_factor_and_gradient() {
         let view = from_above(30.0);
@@ -373,12 +384,40 @@ mod tests {
                 assert!((found - expected).abs() < 1e-6, "{found} {expected}");
             }
         };
-        check(&scene, GAIN as f32 * 0.5 * (0.25 + 0.5 * 0.8));
-        scene.look.occluded = false;
         check(&scene, 0.25 + 0.5 * 0.8);
-        // Opacity that varies nowhere has no surface.
-        scene.opacity.fill(0.0);
-        check(&scene, 0.25 + 0.5);
+        // Half as much is half as light, all of it or what comes from everywhere; more is not lighter.
+        scene.ambient.fill(0.25);
+        check(&scene, 0.5 * (0.25 + 0.5 * 0.8));
+        scene.look.occluded = Occluded::Ambient;
+        check(&scene, 0.5 * 0.25 + 0.5 * 0.8);
+        scene.ambient.fill(0.9);
+        check(&scene, 0.25 + 0.5 * 0.8);
+        scene.ambient.fill(0.25);
+        scene.look.shading = Shading::Phong;
+        check(&scene, 0.25 + 0.5 * 0.8);
+        scene.look.shading = Shading::Ao;
+        check(&scene, 0.5);
+        scene.look.shading = Shading::None;
+        check(&scene, 1.0);
+        // From below nothing comes but to surfaces that are lit from both sides.
+        scene.look = Look { shading: Shading::Phong, light: -scene.look.light, ..scene.look };
+        check(&scene, 0.25);
+        scene.look.two_sided = true;
+        check(&scene, 0.25 + 0.5 * 0.8);
+    }
+
+    /// Behind the faces, opacity that varies nowhere has no surface: the light of no direction.
+    #[test]
+    fn where_there_is_no_surface_light_has_no_direction() {
+        let mut scene = Scene::even(0.2);
+        scene.look.shading = Shading::Phong;
+        // The eye and its near plane in the middle of the box.
+        let view = View { near_mm: 2.0, ..from_above(0.0) };
+        let image = scene.draw(&view, SIZE, 0.1);
+        for colour in &image.colour {
+            let expected = colour[3] * 0.8 * (0.25 + 0.5 * 0.5);
+            assert!((colour[2] - expected).abs() < 1e-5, "{colour:?}");
+        }
     }
 
     #[test]
@@ -431,7 +470,6 @@ mod tests {
         for _ in 0..60 {
             let mut scene = Scene::even(0.5);
             scene.grid = grid;
-            scene.opacity = random.opacities(grid.len());
             scene.ambient = random.opacities(grid.len());
             scene.values = random.opacities(grid.len());
             scene.transfer.opacity = vec![[0.0, 0.0], [1.0, 1.0]];

@@ -72,11 +72,17 @@ fn mean_depth(a: f64, b: f64) -> f64 {
     1.0 + (weighed(u) - weighed(v)) / (v - u)
 }
 
-/// Whether a step has to be halved: its opacity is not that of its ends, because a surface is in it, and matters.
-pub fn varies(transfer: &TransferFunction, found: &Segment, from: f32, to: f32, length: f64) -> bool {
+/// Whether a step has to be halved, through which `open` of the light comes to the eye: its opacity is not that of its ends, because a surface is in it, and matters.
+pub fn varies(
+    transfer: &TransferFunction,
+    found: &Segment,
+    [from, to]: [f32; 2],
+    length: f64,
+    open: f64,
+) -> bool {
     let most = f64::from(kernel::MOST_CHANGE);
     let like = |value: f32| 1.0 - (1.0 - f64::from(transfer.opacity_at(value))).powf(length);
-    found.alpha > most && [from, to].iter().any(|&end| (like(end) - found.alpha).abs() > most)
+    open * found.alpha > most && [from, to].iter().any(|&end| open * (like(end) - found.alpha).abs() > most)
 }
 
 #[cfg(test)]
@@ -141,9 +147,10 @@ mod tests {
         let transfer = transfer(vec![[0.45, 0.0], [0.5, 0.9], [0.55, 0.0]]);
         let found = segment(&transfer, 0.0, 1.0, 1.0);
         assert!(found.alpha > 0.05 && (found.centre - 0.5).abs() < 0.01, "{found:?}");
-        assert!(!varies(&transfer, &found, 0.0, 1.0, 1.0), "{found:?}");
+        assert!(!varies(&transfer, &found, [0.0, 1.0], 1.0, 1.0), "{found:?}");
         let thick = segment(&transfer, 0.0, 1.0, 3.0);
-        assert!(varies(&transfer, &thick, 0.0, 1.0, 3.0), "{thick:?}");
+        assert!(varies(&transfer, &thick, [0.0, 1.0], 3.0, 1.0), "{thick:?}");
+        assert!(!varies(&transfer, &thick, [0.0, 1.0], 3.0, 0.1), "behind what stops nearly all");
     }
 
     #[test]
