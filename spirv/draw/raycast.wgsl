@@ -50,8 +50,8 @@ const CUT_HALVINGS = 8u;
 // Parts that a step can be halved into.
 const PARTS = 16u;
 
-// Where less than this passes, the rest of a step shows nothing.
-const STOPPED = 1e-5;
+// Light is found for stretches of steps, which are as long as a voxel or stop this share of a pixel's light.
+const MOST_LIT = 0.125;
 
 // A step is halved if it stops more than this share of a pixel's light, and this share more or less than it would if all of it were as one
 // of its ends.
@@ -225,6 +225,8 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let part = ray.step / f32(PARTS);
     // mm of way a mm of view depth
     let slant = frame.spacing.w / ray.step;
+    // view depth of a voxel's edge
+    let voxel = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z)) / slant;
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
 
     var colour = vec3(0.0);
@@ -241,112 +243,125 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     // The clip of the last cut, and the depth at which the ray came out of it.
     var cut = NO_CLIP;
     var t_cut = 0.0;
-    // Of the step so far: what passes, the colours that it stops, and depth and value, each times the share that is stopped there.
+    var over = false;
+    // Of the stretch that is not lit yet: where it begins, what passes, the colours that it stops, and depth and value, each times the
+    // share that is stopped there.
+    var t_first = 0.0;
     var open = 1.0;
-    var step_colour = vec3(0.0);
-    var step_centre = vec2(0.0);
+    var tint = vec3(0.0);
+    var centre = vec2(0.0);
     loop {
-        let t = ray.begin + f32(n) * part;
-        if !(t < ray.end) {
-            break;
-        }
-        if n >= n_out && size == PARTS {
-            let position = start + t * along;
-            let brick = vec3<i32>(brick_of(position, bricks));
-            let leap = i32(distance_in(distances.word[brick_index(vec3<u32>(brick), bricks)]));
-            // To the last sample before the bricks that are not nearer than `leap`, or out of this one.
-            let way = max(leap, 1);
-            let low = vec3<f32>(brick - way + 1) * f32(BRICK);
-            let high = vec3<f32>(brick + way) * f32(BRICK);
-            let out_low = select((low - start) / along, vec3(1e30), brick < vec3(way));
-            let out_high = select((high - start) / along, vec3(1e30), brick + way >= vec3<i32>(bricks));
-            // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
-            let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
-            let t_out = min(out.x, min(out.y, out.z));
-            let last = PARTS * u32(clamp(floor((t_out - ray.begin) / ray.step - LEAP_MARGIN), 0.0, 1e8));
-            if leap > 0 {
-                if last > n {
-                    n = last;
-                    known = false;
-                    continue;
-                }
-            } else {
-                n_out = last;
-            }
-        }
-        let t_next = select(t, min(ray.begin + f32(n + size) * part, ray.end), known);
-        let next = value_at(start + t_next * along);
-        // Whether any value between has opacity.
-        if known && max(here, next) > transfer.least && min(here, next) < transfer.most {
-            var t_from = t;
-            var t_to = t_next;
-            var near = here;
-            var far = next;
-            var shows = true;
-            if clips.count > 0u {
-                let shown_from = visible_to(asked_at(start + t * along, bricks), eye.origin.xyz + t * ray.direction);
-                let shown_to = visible_to(asked_at(start + t_next * along, bricks), eye.origin.xyz + t_next * ray.direction);
-                shows = shown_from || shown_to;
-                if shown_from != shown_to {
-                    // Only the part on one side of the cut shows.
-                    let sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
-                    let at_cut = value_at(start + sides.y * along);
-                    if shown_to {
-                        t_from = sides.y;
-                        near = at_cut;
-                        cut = hiding(eye.origin.xyz + sides.x * ray.direction);
-                        t_cut = sides.y;
-                    } else {
-                        t_to = sides.y;
-                        far = at_cut;
-                    }
-                }
-            }
-            if shows {
-                let from_sample = sample_of(near);
-                let to_sample = sample_of(far);
-                // in reference lengths
-                let length = (t_to - t_from) * slant / frame.light.w;
-                let found = segment(from_sample, to_sample, length);
-                if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
-                    size /= 2u;
-                    continue;
-                }
-                step_colour += open * found.colour;
-                step_centre += open * found.alpha * vec2(mix(t_from, t_to, found.centre), mix(near, far, found.centre));
-                open *= 1.0 - found.alpha;
-            }
-        }
-        here = next;
-        if known {
-            n += size;
-            size = min(min(2u * size, PARTS), n & (~n + 1u));
-        }
-        known = true;
-        // Light is found once a step, where its share of it comes from.
-        if open < 1.0 && (n % PARTS == 0u || t_next >= ray.end || open * (1.0 - alpha) < STOPPED) {
-            let covered = 1.0 - open;
-            let t_shown = step_centre.x / covered;
-            let at = Shown(
-                start + t_shown * along,
-                eye.origin.xyz + t_shown * ray.direction,
-                step_centre.y / covered,
-                step_colour / covered,
-                cut,
-                (t_shown - t_cut) * slant,
-            );
-            colour += (1.0 - alpha) * covered * shaded(at, ray.direction);
-            alpha += (1.0 - alpha) * covered;
-            if depth == 1.0 && alpha >= 0.5 {
-                depth = eye.depth.x + eye.depth.y / t_shown;
-            }
-            if ends(colour, alpha) {
+        // A stretch at a time, so that neighbouring rays are lit together whatever they have passed.
+        loop {
+            let t = ray.begin + f32(n) * part;
+            over = !(t < ray.end);
+            let covered = (1.0 - alpha) * (1.0 - open);
+            let full = n % PARTS == 0u && (covered > MOST_LIT || t - t_first >= voxel);
+            if over || open < 1.0 && (full || ends(colour, alpha + covered)) {
                 break;
             }
-            step_colour = vec3(0.0);
-            step_centre = vec2(0.0);
-            open = 1.0;
+            if n >= n_out && size == PARTS {
+                let position = start + t * along;
+                let brick = vec3<i32>(brick_of(position, bricks));
+                let leap = i32(distance_in(distances.word[brick_index(vec3<u32>(brick), bricks)]));
+                // To the last sample before the bricks that are not nearer than `leap`, or out of this one.
+                let way = max(leap, 1);
+                let low = vec3<f32>(brick - way + 1) * f32(BRICK);
+                let high = vec3<f32>(brick + way) * f32(BRICK);
+                let out_low = select((low - start) / along, vec3(1e30), brick < vec3(way));
+                let out_high = select((high - start) / along, vec3(1e30), brick + way >= vec3<i32>(bricks));
+                // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
+                let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
+                let t_out = min(out.x, min(out.y, out.z));
+                let last = PARTS * u32(clamp(floor((t_out - ray.begin) / ray.step - LEAP_MARGIN), 0.0, 1e8));
+                if leap > 0 {
+                    if last > n {
+                        n = last;
+                        known = false;
+                        continue;
+                    }
+                } else {
+                    n_out = last;
+                }
+            }
+            let t_next = select(t, min(ray.begin + f32(n + size) * part, ray.end), known);
+            let next = value_at(start + t_next * along);
+            // Whether any value between has opacity.
+            if known && max(here, next) > transfer.least && min(here, next) < transfer.most {
+                var t_from = t;
+                var t_to = t_next;
+                var near = here;
+                var far = next;
+                var shows = true;
+                if clips.count > 0u {
+                    let shown_from = visible_to(asked_at(start + t * along, bricks), eye.origin.xyz + t * ray.direction);
+                    let shown_to = visible_to(asked_at(start + t_next * along, bricks), eye.origin.xyz + t_next * ray.direction);
+                    shows = shown_from || shown_to;
+                    if shown_from != shown_to {
+                        // Only the part on one side of the cut shows.
+                        let sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
+                        let at_cut = value_at(start + sides.y * along);
+                        if shown_to {
+                            t_from = sides.y;
+                            near = at_cut;
+                            cut = hiding(eye.origin.xyz + sides.x * ray.direction);
+                            t_cut = sides.y;
+                        } else {
+                            t_to = sides.y;
+                            far = at_cut;
+                        }
+                    }
+                }
+                if shows {
+                    let from_sample = sample_of(near);
+                    let to_sample = sample_of(far);
+                    // in reference lengths
+                    let length = (t_to - t_from) * slant / frame.light.w;
+                    let found = segment(from_sample, to_sample, length);
+                    if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
+                        size /= 2u;
+                        continue;
+                    }
+                    if open == 1.0 {
+                        t_first = t;
+                    }
+                    tint += open * found.colour;
+                    centre += open * found.alpha * vec2(mix(t_from, t_to, found.centre), mix(near, far, found.centre));
+                    open *= 1.0 - found.alpha;
+                }
+            }
+            here = next;
+            if known {
+                n += size;
+                size = min(min(2u * size, PARTS), n & (~n + 1u));
+            }
+            known = true;
         }
+        if open == 1.0 {
+            break;
+        }
+        // It is lit where its light comes from.
+        let stops = 1.0 - open;
+        let t_shown = centre.x / stops;
+        let at = Shown(
+            start + t_shown * along,
+            eye.origin.xyz + t_shown * ray.direction,
+            centre.y / stops,
+            tint / stops,
+            cut,
+            (t_shown - t_cut) * slant,
+        );
+        colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
+        alpha += (1.0 - alpha) * stops;
+        if depth == 1.0 && alpha >= 0.5 {
+            depth = eye.depth.x + eye.depth.y / t_shown;
+        }
+        if over || ends(colour, alpha) {
+            break;
+        }
+        open = 1.0;
+        tint = vec3(0.0);
+        centre = vec2(0.0);
     }
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
 }

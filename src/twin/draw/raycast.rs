@@ -10,7 +10,7 @@
 //!
 //! where c_k is the segment's mean colour and p_k where its light comes from; the last L is the brightest light there is and E′ the slope
 //! of sRGB coding at the darkest component: what remains cannot change an 8-bit pixel by more than half a level. A segment that stops
-//! more light than its ends alone say is halved, up to four times.
+//! more light than its ends alone say is halved, up to four times; stretches of segments are lit together, up to a voxel long or until they stop an eighth of the light.
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::segment::{segment, varies};
@@ -24,6 +24,9 @@ use glam::{DVec3, Vec2};
 
 /// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
 pub const TOLERANCE: f64 = 0.5;
+
+/// Share of a pixel's light that a stretch of steps may stop before it is lit.
+const MOST_LIT: f64 = kernel::MOST_LIT as f64;
 
 /// Parts that a step can be halved into.
 const PARTS: u64 = kernel::PARTS as u64;
@@ -128,13 +131,47 @@ fn pixel(
     let light = frame.look.towards_light(view.orientation).as_dvec3();
     let (mut colour, mut alpha, mut depth) = (DVec3::ZERO, 0.0, 1.0);
     let (mut clip, mut cut_at) = (None, 0.0);
-    // Of the step so far: what passes, the colours that it stops, and place and value, each times the share that is stopped there.
-    let (mut open, mut step_colour, mut step_place, mut step_value) = (1.0, DVec3::ZERO, 0.0, 0.0);
+    // Of the stretch that is not lit yet: where it begins, what passes, and the colours that it stops, place and value times the share that
+    // is stopped there.
+    let (mut first, mut open, mut lit) = (0.0, 1.0, (DVec3::ZERO, 0.0, 0.0));
     // Parts of steps so far, and of the next one.
     let (mut n, mut size) = (0, PARTS);
     let place = |n: u64| begin + n as f64 * frame.step_mm / PARTS as f64;
-    while place(n) < end {
-        let (t, next) = (place(n), place(n + size).min(end));
+    loop {
+        let t = place(n);
+        if open < 1.0 {
+            let covered = (1.0 - alpha) * (1.0 - open);
+            let ends = |colour: DVec3, alpha: f64| {
+                (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0
+            };
+            let full = n % PARTS == 0 && (covered > MOST_LIT || t - first >= frame.grid.min_spacing());
+            if t >= end || full || ends(colour, alpha + covered) {
+                // The stretch is lit where its light comes from.
+                let stops = 1.0 - open;
+                let t = lit.1 / stops;
+                let shown = Shown {
+                    position: at(t),
+                    world: origin + t * direction,
+                    value: (lit.2 / stops) as f32,
+                    colour: lit.0 / stops,
+                    cut: clip,
+                    beside: t - cut_at,
+                };
+                colour += covered * shaded(frame, &shown, direction, light, ambient);
+                alpha += covered;
+                if depth == 1.0 && alpha >= 0.5 {
+                    depth = vulkan_depth(view, t / slant);
+                }
+                if ends(colour, alpha) {
+                    break;
+                }
+                (open, lit) = (1.0, (DVec3::ZERO, 0.0, 0.0));
+            }
+        }
+        if t >= end {
+            break;
+        }
+        let next = place(n + size).min(end);
         let [mut from, mut to] = [t, next];
         let [shown, stays] = [t, next].map(shown_at);
         if shown != stays {
@@ -155,37 +192,17 @@ fn pixel(
                 size /= 2;
                 continue;
             }
-            step_colour += open * found.colour;
-            step_place += open * found.alpha * (from + found.centre * (to - from));
-            let value = f64::from(values[0]) + found.centre * f64::from(values[1] - values[0]);
-            step_value += open * found.alpha * value;
+            if open == 1.0 {
+                first = t;
+            }
+            let share = open * found.alpha;
+            lit.0 += open * found.colour;
+            lit.1 += share * (from + found.centre * (to - from));
+            lit.2 += share * (f64::from(values[0]) + found.centre * f64::from(values[1] - values[0]));
             open *= 1.0 - found.alpha;
         }
         n += size;
         size = (2 * size).min(PARTS).min(1 << n.trailing_zeros());
-        // Light is found once a step, where its share of it comes from.
-        let stopped = open * (1.0 - alpha) < f64::from(kernel::STOPPED);
-        if open < 1.0 && (n % PARTS == 0 || stopped || place(n) >= end) {
-            let covered = 1.0 - open;
-            let t = step_place / covered;
-            let shown = Shown {
-                position: at(t),
-                world: origin + t * direction,
-                value: (step_value / covered) as f32,
-                colour: step_colour / covered,
-                cut: clip,
-                beside: t - cut_at,
-            };
-            colour += (1.0 - alpha) * covered * shaded(frame, &shown, direction, light, ambient);
-            alpha += (1.0 - alpha) * covered;
-            if depth == 1.0 && alpha >= 0.5 {
-                depth = vulkan_depth(view, t / slant);
-            }
-            if (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0 {
-                break;
-            }
-            (open, step_colour, step_place, step_value) = (1.0, DVec3::ZERO, 0.0, 0.0);
-        }
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
 }
