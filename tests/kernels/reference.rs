@@ -228,8 +228,18 @@ impl Scene {
         steps_per_voxel: u32,
     ) -> reference::ImageReference {
         let plan = Plan { directions, steps_per_voxel, max_voxels: usize::MAX };
-        reference::image(gpu, &self.frame(&[], 1.0), &self.opacity, &self.view, SIZE, radius_mm, 0.5, &plan, &mut |_| ())
-            .unwrap()
+        reference::image(
+            gpu,
+            &self.frame(&[], 1.0),
+            &self.opacity,
+            &self.view,
+            SIZE,
+            radius_mm,
+            0.5,
+            &plan,
+            &mut |_| (),
+        )
+        .unwrap()
     }
 }
 
