@@ -398,3 +398,69 @@ fn flat_cuts_at_any_angle_are_flat() {
     drop(renderer);
     close(gpu);
 }
+
+/// The head's light is that of the first view for all views, however an eye is turned on the head; the world's stays.
+#[test]
+fn all_views_see_the_light_of_the_first_ones_head() {
+    let gpu = open();
+    let volume = scanned(ball, 2.0, true);
+    let renderer = renderer(&gpu, &volume, opaque_from(127.5), &[]);
+    let [first, second] = sides(&volume, 30.0, 20.0);
+    let look = Look { shading: Shading::Phong, ..Look::default() };
+    let draw = |views: &[View; 2], look: &Look| renderer.draw(views, look, [SIZE; 2]).unwrap().0;
+    let seen = draw(&[first, second], &look);
+    let world = Look { light: look.towards_light(first.orientation), light_from: LightFrom::World, ..look };
+    let fixed = draw(&[second, first], &world);
+    let differ = |a: &[[f32; 4]], b: &[[f32; 4]]| {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    // A light that is turned twice rounds twice, and a highlight takes its 24th power.
+    assert!(
+        differ(&seen.colour[0], &fixed.colour[1]) < 1e-4 && differ(&seen.colour[1], &fixed.colour[0]) < 1e-4
+    );
+    assert!(
+        differ(&seen.colour[1], &draw(&[second, first], &look).colour[0]) > 0.1,
+        "another head, another light"
+    );
+    drop(renderer);
+    close(gpu);
+}
+
+/// A cube under light from everywhere: its edges do not shine against its walls, and its walls have most of the light.
+#[test]
+fn edges_have_no_white_rims() {
+    /// Levels of 255 between the lightest pixel and the walls. Half a voxel out of an edge there is still more light than before a
+    /// wall: 10 levels; at the place itself it would be 29.
+    const RIM: f64 = 12.0;
+    /// Of the light that comes from everywhere, in levels, a wall has this share: rays of a wall that begin half a voxel out.
+    const WALL: f64 = 0.9;
+
+    let gpu = open();
+    let grid = Grid { dims: [64; 3], spacing: [1.0; 3] };
+    let value = |i: usize| {
+        let along = |c: usize| (0.5 - ((c as f64 - 31.8).abs() - 19.0)).clamp(0.0, 1.0);
+        (200.0 * grid.voxel(i).map(along).iter().product::<f64>()).round() as u8
+    };
+    let volume =
+        Volume::new(grid.dims, grid.spacing, Values::U8((0..grid.len()).map(value).collect())).unwrap();
+    let ramp =
+        TransferFunction::new(vec![[20.0, 0.0], [140.0, 0.95]], vec![[0.0, 0.5, 0.5, 0.5]], None).unwrap();
+    let mut setup = Setup::of(Method::default(), 1.0);
+    setup.occlusion.radius_mm = 16.0;
+    let mut renderer = Renderer::new(&gpu, &volume, ramp, setup, COLOUR).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let look = Look { shading: Shading::Ao, ..Look::default() };
+    let (image, _) = renderer.draw(&sides(&volume, 30.0, 25.0), &look, [SIZE; 2]).unwrap();
+    let full = level(0.5);
+    for colour in &image.colour {
+        let mut levels: Vec<f64> =
+            colour.iter().filter(|c| c[3] > 0.99).map(|c| level(f64::from(c[0]))).collect();
+        levels.sort_by(f64::total_cmp);
+        let (wall, lightest) = (levels[levels.len() / 2], levels[levels.len() - 1]);
+        println!("{wall} {lightest} {full} {}", levels.len());
+        assert!(lightest - wall <= RIM, "walls {wall}, lightest {lightest} levels");
+        assert!(wall >= WALL * full && lightest <= full + 0.5, "walls {wall} of {full} levels");
+    }
+    drop(renderer);
+    close(gpu);
+}
