@@ -430,7 +430,7 @@ fn all_views_see_the_light_of_the_first_ones_head() {
 #[test]
 fn edges_have_no_white_rims() {
     /// Levels of 255 between the lightest pixel and the walls. Half a voxel out of an edge there is still more light than before a
-    /// wall: 10 levels; at the place itself it would be 29.
+    /// wall: 10 levels; at the place itself it would be 24.
     const RIM: f64 = 12.0;
     /// Of the light that comes from everywhere, in levels, a wall has this share: rays of a wall that begin half a voxel out.
     const WALL: f64 = 0.9;
