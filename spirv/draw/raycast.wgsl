@@ -44,8 +44,8 @@ const TILE = 8u;
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none behind it is left out.
 const LEAP_MARGIN = 0.1;
 
-// Halvings of a step at a cut: a face's depth errs by less than 1/1000 of a voxel.
-const CUT_HALVINGS = 8u;
+// Halvings of a step at a cut: the depth of a face errs by less than 1/64 of it.
+const CUT_HALVINGS = 6u;
 
 // Parts that a step can be halved into.
 const PARTS = 16u;
@@ -93,11 +93,10 @@ fn value_at(position: vec3<f32>) -> f32 {
 
 #include "shared/shading.wgsl"
 
-// Whether nothing that lies further along the ray can change a pixel of the picture by more than the frame's tolerance. What
-// remains adds at most its share of the brightest light to a component, or takes as much of a background; sRGB coding
-// spreads that by its slope, which is largest at the darkest component so far (12.92 at 0, 1.055/2.4 c^(-7/12) above).
-fn ends(colour: vec3<f32>, alpha: f32) -> bool {
-    let rest = 1.0 - alpha;
+// Whether the rest of a ray's light cannot change a pixel of the picture by more than the frame's tolerance. It adds at most its share of
+// the brightest light to a component, or takes as much of a background; sRGB coding spreads that by its slope, which is largest at the
+// darkest component so far (12.92 at 0, 1.055/2.4 c^(-7/12) above).
+fn ends(colour: vec3<f32>, rest: f32) -> bool {
     // The slope at 1 is the least.
     if rest * 0.4396 > frame.remainder {
         return false;
@@ -257,7 +256,9 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             over = !(t < ray.end);
             let covered = (1.0 - alpha) * (1.0 - open);
             let full = n % PARTS == 0u && (covered > MOST_LIT || t - t_first >= voxel);
-            if over || open < 1.0 && (full || ends(colour, alpha + covered)) {
+            // What is left out of a stretch also moves the place where it is lit: by its share of a voxel, over which light changes by less
+            // than all of it.
+            if over || open < 1.0 && (full || ends(colour, 2.0 * (1.0 - alpha) * open)) {
                 break;
             }
             if n >= n_out && size == PARTS {
@@ -356,7 +357,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
         if depth == 1.0 && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;
         }
-        if over || ends(colour, alpha) {
+        if over || ends(colour, 1.0 - alpha) {
             break;
         }
         open = 1.0;

@@ -34,11 +34,8 @@ fn local_normal(kind: u32, p: vec3<f32>) -> vec3<f32> {
     }
 }
 
-// Pixels round a wall that say how it runs; its stairs are a pixel.
-const WALL_WINDOW = 3;
-
-// A face this much steeper than the map's pixels, depth over width, is no wall whatever its stairs are.
-const STEEP = 4.0;
+// Pixels round a wall that say how it runs, each way: a stair of one pixel turns the mean direction of 13 x 13 by 1 degree in the mean.
+const WALL_WINDOW = 6;
 
 fn depth_at(c: u32, map: u32, pixel: vec2<i32>) -> f32 {
     let resolution = i32(clips.clip[c].resolution);
@@ -48,15 +45,20 @@ fn depth_at(c: u32, map: u32, pixel: vec2<i32>) -> f32 {
     return layers.depth[clips.clip[c].layers_at + (map * u32(resolution) + u32(pixel.y)) * u32(resolution) + u32(pixel.x)];
 }
 
-// Change of a map's depth from this pixel to the next one along a direction; of the two that it has the smaller, for where it has an
-// edge the other one leads over it. 0 where it ends on both sides.
+// Change of a map's depth from this pixel to the next one along a direction, by the two on its side or the two on the other: those that
+// lie more nearly in a line with it, for a line of three that leads over an edge bends there.
 fn rise_of(c: u32, map: u32, pixel: vec2<i32>, depth: f32, along: vec2<i32>) -> f32 {
-    let next = depth_at(c, map, pixel + along);
-    let last = depth_at(c, map, pixel - along);
-    let forwards = select(next - depth, EMPTY, next >= EMPTY);
-    let backwards = select(depth - last, EMPTY, last >= EMPTY);
-    let smaller = select(backwards, forwards, abs(forwards) < abs(backwards));
-    return select(smaller, 0.0, smaller >= EMPTY);
+    let forwards = rise_to(depth, depth_at(c, map, pixel + along), depth_at(c, map, pixel + 2 * along));
+    let backwards = rise_to(depth, depth_at(c, map, pixel - along), depth_at(c, map, pixel - 2 * along));
+    return select(-backwards.x, forwards.x, forwards.y <= backwards.y);
+}
+
+// Change to the next depth, and how much of a bend follows: beyond all others where the face ends.
+fn rise_to(depth: f32, next: f32, after: f32) -> vec2<f32> {
+    if next >= EMPTY {
+        return vec2(0.0, 4.0);
+    }
+    return vec2(next - depth, select(abs(after - 2.0 * next + depth), 3.0, after >= EMPTY));
 }
 
 // Direction across a wall along the map's view, by what is inside round it at this depth.
@@ -82,56 +84,62 @@ fn across_wall(c: u32, map: vec3<f32>, pixel: vec2<i32>) -> vec2<f32> {
 }
 
 // In the mesh's rigid frame; its sign is the caller's. The ray came to `rigid` from the eye and has just crossed a face of the layers:
-// either the depth of one in this pixel, or the border to the pixel before. That border is a stair of a layer that goes on there at
-// about the depth that its slope promises, or else a wall along the map's view.
+// the depth of one in this pixel, or the border to the pixel before. A border is a stair of a layer that comes to this depth within
+// two pixels, by its own slope; or else a wall along the map's view, which no layer shows.
 fn mesh_normal(c: u32, rigid: vec3<f32>, towards_eye: vec3<f32>) -> vec3<f32> {
-    let clip = clips.clip[c].corner.w;
-    let to_depths = vec3(clip, clip, clips.clip[c].per_depth);
+    let corner = clips.clip[c].corner;
+    let to_map = vec3(corner.w, corner.w, clips.clip[c].per_depth);
     let map = map_of(c, rigid);
-    let way = towards_eye * to_depths;
+    let way = towards_eye * to_map;
     let here = vec2<i32>(floor(map.xy));
     // Ways back to the borders of the pixel.
-    let border = select(map.xy - floor(map.xy), floor(map.xy) + 1.0 - map.xy, way.xy > vec2(0.0));
+    let border = select(fract(map.xy), 1.0 - fract(map.xy), way.xy > vec2(0.0));
     let to_border = select(border / abs(way.xy), vec2(1e30), way.xy == vec2(0.0));
-    let along = select(vec2(0, 1), vec2(1, 0), to_border.x < to_border.y);
-    let before = here + along * vec2<i32>(sign(way.xy));
+    let sideways = select(vec2(0, 1), vec2(1, 0), to_border.x < to_border.y);
+    let before = here + sideways * vec2<i32>(sign(way.xy));
 
-    // The map whose depth here is the nearest before, and the one nearest to the point in the pixel before.
+    // The first face before the border, and of both pixels the face nearest to the point.
     let maps = 2u * clips.clip[c].pairs;
-    var crossed = maps;
-    var to_depth = min(to_border.x, to_border.y);
+    var m = maps;
+    var pixel = here;
+    var to_face = min(to_border.x, to_border.y);
     var nearest = maps;
+    var nearest_in = here;
     var distance = 1e30;
-    for (var m = 0u; m < maps; m++) {
-        let depth = depth_at(c, m, here);
+    for (var i = 0u; i < maps; i++) {
+        let depth = depth_at(c, i, here);
         let back = (depth - map.z) / way.z;
-        if depth < EMPTY && back >= 0.0 && back < to_depth {
-            crossed = m;
-            to_depth = back;
+        if depth < EMPTY && back >= 0.0 && back < to_face {
+            m = i;
+            to_face = back;
         }
-        let depth_before = depth_at(c, m, before);
-        let off = abs(depth_before - map.z);
-        if depth_before < EMPTY && off < distance {
-            nearest = m;
-            distance = off;
+        if depth < EMPTY && abs(depth - map.z) < distance {
+            nearest = i;
+            nearest_in = here;
+            distance = abs(depth - map.z);
+        }
+        let depth_before = depth_at(c, i, before);
+        if depth_before < EMPTY && abs(depth_before - map.z) < distance {
+            nearest = i;
+            nearest_in = before;
+            distance = abs(depth_before - map.z);
         }
     }
-    let through_border = crossed == maps;
-    let pixel = select(here, before, through_border);
-    let m = select(crossed, nearest, through_border);
-    if m == maps {
+    let at_border = m == maps;
+    if at_border {
+        m = nearest;
+        pixel = nearest_in;
+    }
+    var rise = vec2(0.0);
+    if m < maps {
+        let depth = depth_at(c, m, pixel);
+        rise = vec2(rise_of(c, m, pixel, depth, vec2(1, 0)), rise_of(c, m, pixel, depth, vec2(0, 1)));
+    }
+    // Or a face that the ray crossed with that border in one step: within a pixel's edge.
+    if at_border && distance > 2.0 * (abs(rise.x) + abs(rise.y)) + to_map.z / to_map.x {
         return vec3(across_wall(c, map, before), 0.0);
     }
-    let depth = depth_at(c, m, pixel);
-    let rise = vec2(rise_of(c, m, pixel, depth, vec2(1, 0)), rise_of(c, m, pixel, depth, vec2(0, 1)));
-    let slope = rise * to_depths.xy / to_depths.z;
-    if through_border && dot(slope, slope) < STEEP * STEEP {
-        let stair = abs(depth_at(c, m, here) - depth);
-        if stair > 2.0 * dot(abs(rise), vec2<f32>(along)) + ONE_DEPTH {
-            return vec3(across_wall(c, map, before), 0.0);
-        }
-    }
-    return vec3(slope, -1.0);
+    return vec3(rise * to_map.xy / to_map.z, -1.0);
 }
 
 // Of the cut at this point, on which a ray came out of a clip.

@@ -49,18 +49,30 @@ fn reflected(normal: vec3<f32>, front: f32, back: f32, towards_eye: vec3<f32>) -
     return vec2(arriving, select(0.0, arriving * pow(mirrored, frame.shininess), same_side));
 }
 
-// The same of a place inside the volume, by the gradient of the values. Opacity a voxel before and behind it along the gradient
-// says how much of a surface there is, relative to the largest of the three, and which side is out: a ridge has two.
-fn reflected_inside(at: Shown, towards_eye: vec3<f32>) -> vec2<f32> {
+// What light finds at a place.
+struct Surface {
+    // diffuse and specular part of what comes back
+    back: vec2<f32>,
+    // index coordinates from the place to where the ambient factor of its surface is
+    outside: vec3<f32>,
+}
+
+// The ambient factor of a surface is that of the air in front of it, half a voxel out of it: where half of the opacity is reached, its own
+// matter already takes a part that edges do not lose, and would shine against flat walls. Farther out no value is needed, so
+// that none is there (method.md section 9).
+const AIR = 0.5;
+
+// Inside the volume, by the gradient of the values. Opacity a voxel before and behind the place along the gradient says how much of a
+// surface there is, relative to the largest of the three, and which side is out: a ridge has two.
+fn surface_inside(at: Shown, towards_eye: vec3<f32>) -> Surface {
     let gradient = texel_gradient(at.position) / frame.spacing.xyz;
     let rise = length(gradient);
-    let none = vec2(NO_DIRECTION, 0.0);
+    let none = Surface(vec2(NO_DIRECTION, 0.0), vec3(0.0));
     if !(rise > 0.0) {
         return none;
     }
     let normal = gradient / rise;
-    let spacing = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
-    let voxel = normal * spacing / frame.spacing.xyz;
+    let voxel = normal * smallest_spacing() / frame.spacing.xyz;
     let here = opacity_of(at.value);
     let before = opacity_of(value_at(at.position - voxel));
     let behind = opacity_of(value_at(at.position + voxel));
@@ -68,52 +80,62 @@ fn reflected_inside(at: Shown, towards_eye: vec3<f32>) -> vec2<f32> {
     if !(change > 0.0) {
         return none;
     }
-    let surface = smoothstep(NO_SURFACE, SURFACE, change / max(here, max(before, behind)));
+    let largest = max(here, max(before, behind));
+    let share = smoothstep(NO_SURFACE, SURFACE, change / largest);
     // -1 ... 1: out is against the gradient, both ways, along it.
     let out = (before - behind) / change;
     let lit_back = max(1.0 - max(out, 0.0), frame.two_sided);
     let lit_front = max(1.0 + min(out, 0.0), frame.two_sided);
-    return mix(none, reflected(normal, lit_front, lit_back, towards_eye), surface);
+    let back = mix(none.back, reflected(normal, lit_front, lit_back, towards_eye), share);
+    return Surface(back, voxel * out * share * min(here / largest, AIR));
 }
 
-// The same at any place.
-fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
+fn smallest_spacing() -> f32 {
+    return min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
+}
+
+// At any place.
+fn surface_at(at: Shown, direction: vec3<f32>) -> Surface {
     let towards_eye = -normalize(direction);
     let along = direction / frame.spacing.xyz;
     // The face of the volume through which the ray came in, and the way since then.
     let face = select(frame.dims.xyz - 0.5, vec3(-0.5), along > vec3(0.0));
     let since = select((at.position - face) / along, vec3(1e30), along == vec3(0.0));
-    let entered = min(since.x, min(since.y, since.z)) * length(direction);
+    let first = min(since.x, min(since.y, since.z));
+    let entered = first * length(direction);
     let by_clip = at.cut != NO_CLIP && at.beside <= entered;
-    let voxel = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z));
-    let cut = 1.0 - smoothstep(CUT_HOLDS * voxel, CUT_ENDS * voxel, select(entered, at.beside, by_clip));
-    var reflected_cut = vec2(0.0);
-    if cut > 0.0 {
-        var normal = vec3(0.0);
-        if by_clip {
-            normal = clip_normal(at.cut, at.world + at.beside * towards_eye, towards_eye);
-        } else {
-            // Of two faces that meet, both: their edge has no direction of its own.
-            normal = normalize(-sign(direction) * vec3<f32>(since <= vec3(min(since.x, min(since.y, since.z)))));
-        }
-        reflected_cut = reflected(normal, 1.0, frame.two_sided, towards_eye);
+    let way = select(entered, at.beside, by_clip) / smallest_spacing();
+    let cut = 1.0 - smoothstep(CUT_HOLDS, CUT_ENDS, way);
+    if cut == 0.0 {
+        return surface_inside(at, towards_eye);
     }
+    var normal = vec3(0.0);
+    if by_clip {
+        normal = clip_normal(at.cut, at.world + at.beside * towards_eye, towards_eye);
+    } else {
+        // Of two faces that meet, both: their edge has no direction of its own.
+        normal = normalize(-sign(direction) * vec3<f32>(since <= vec3(first)));
+    }
+    let back = reflected(normal, 1.0, frame.two_sided, towards_eye);
+    let outside = AIR * normal * smallest_spacing() / frame.spacing.xyz;
     if cut == 1.0 {
-        return reflected_cut;
+        return Surface(back, outside);
     }
-    return mix(reflected_inside(at, towards_eye), reflected_cut, cut);
+    let inside = surface_inside(at, towards_eye);
+    return Surface(mix(inside.back, back, cut), mix(inside.outside, outside, cut));
 }
 
 // Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
 fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
-    var back = vec2(0.0);
-    if frame.diffuse + frame.specular > 0.0 {
-        back = reflected_at(at, direction) * vec2(frame.diffuse, frame.specular);
+    if frame.diffuse + frame.specular + frame.occluded == 0.0 {
+        return frame.ambient * at.colour;
     }
+    let surface = surface_at(at, direction);
     var open = 1.0;
     if frame.occluded > 0.0 {
-        open = min(frame.gain * ambient_at(at.position), 1.0);
+        open = min(frame.gain * ambient_at(at.position + surface.outside), 1.0);
     }
     let open_rest = mix(1.0, open, frame.occluded_rest);
-    return (open * frame.ambient + open_rest * back.x) * at.colour + open_rest * back.y;
+    let matt = open * frame.ambient + open_rest * frame.diffuse * surface.back.x;
+    return matt * at.colour + open_rest * frame.specular * surface.back.y;
 }

@@ -50,12 +50,12 @@
 //!
 //!     [shading]
 //!     mode = "phong+ao"                # none: colours alone; phong: without ambient occlusion; ao: colours times the ambient factor
-//!     ambient = 0.5                    # light from everywhere
-//!     diffuse = 0.6                    # light that depends on the surface's direction
+//!     ambient = 0.4                    # light from everywhere
+//!     diffuse = 0.65                   # light that depends on the surface's direction
 //!     specular = 0.15                  # white light that surfaces reflect towards the eye
 //!     shininess = 24                   # its exponent: the larger, the smaller the highlight
 //!     two_sided = false                # true: surfaces are lit from behind as from the front
-//!     light = [-0.5, 0.6, 0.7]         # direction towards it: of the head right, up, backwards; of the world x, y, z
+//!     light = [-0.7, 0.7, 0.6]         # direction towards it: of the head right, up, backwards; of the world x, y, z
 //!     light_from = "head"              # or "world"
 //!     occlusion = "ambient"            # the light that the ambient factor multiplies; "all", as the paper's pictures
 //!     gain = 2                         # the ambient factor is shown times this, and at most as 1; a flat wall's is 1/2

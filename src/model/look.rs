@@ -115,12 +115,12 @@ impl Default for Look {
     fn default() -> Self {
         Self {
             shading: Shading::PhongAo,
-            ambient: 0.5,
-            diffuse: 0.6,
+            ambient: 0.4,
+            diffuse: 0.65,
             specular: 0.15,
             shininess: 24.0,
             two_sided: false,
-            light: Vec3::new(-0.5, 0.6, 0.7).normalize(),
+            light: Vec3::new(-0.7, 0.7, 0.6).normalize(),
             light_from: LightFrom::Head,
             occluded: Occluded::Ambient,
             gain: 2.0,

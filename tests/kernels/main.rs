@@ -17,4 +17,5 @@ mod present;
 mod raycast;
 mod rays;
 mod reference;
+mod shading;
 mod ssao;

@@ -112,7 +112,7 @@ def transfer(reference_mm):
 class Scene:
     """A volume of opacities, and how both systems draw it.
 
-    `look` holds ambient, diffuse, light and step_mm, as `stereo-bench --json` gives them; files go into `folder`.
+    `look` holds ambient, diffuse and step_mm, as `stereo-bench --json` gives them, and light, in the world; files go into `folder`.
     """
 
     def __init__(self, path, size, radius, look, folder):
@@ -131,7 +131,9 @@ class Scene:
         lines += ["[image]", f"width = {self.size[0]}", f"height = {self.size[1]}"]
         lines += [f"step_mm = {self.look['step_mm']}", f'background = "{BACKGROUND}"', "[shading]"]
         lines += [f"{key} = {self.look[key]}" for key in ("ambient", "diffuse", "light")]
-        lines += [f"occlusion = {'false' if method == 'solid' else 'true'}", ""]
+        # As VTK lights: no highlight, both sides of a surface.
+        lines += ["specular = 0", "two_sided = true", 'light_from = "world"', 'occlusion = "all"']
+        lines += [f'mode = "{"phong" if method == "solid" else "phong+ao"}"', ""]
         return "\n".join(lines)
 
     def draw(self, rig, plane, method):

@@ -335,7 +335,9 @@ def measure(given, folder):
         (rig_of(frame["views"]), Plane(frame["clip"]["translate_mm"], frame["clip"]["rotate_deg"]))
         for frame in answer["path"]["frames"]
     ]
-    scene = Scene(path, given.size, radius, answer["path"], folder)
+    # VTK's light stands still in the world; that of `stereo-bench` moves with the head.
+    look = {**answer["path"], "light": [-0.4, -0.7, 0.6]}
+    scene = Scene(path, given.size, radius, look, folder)
     view = vtk_view(scene)
     pictures = pictures_of(scene, view, *frames[0], OURS, vtk.MODES)
     later = pictures_of(scene, view, *frames[-1], ["solid"], ["plain"])

@@ -141,11 +141,12 @@ fn pixel(
         let t = place(n);
         if open < 1.0 {
             let covered = (1.0 - alpha) * (1.0 - open);
-            let ends = |colour: DVec3, alpha: f64| {
-                (1.0 - alpha) * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0
+            let ends = |colour: DVec3, rest: f64| {
+                rest * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0
             };
             let full = n % PARTS == 0 && (covered > MOST_LIT || t - first >= frame.grid.min_spacing());
-            if t >= end || full || ends(colour, alpha + covered) {
+            // What is left out of a stretch also moves the place where it is lit.
+            if t >= end || full || ends(colour, 2.0 * (1.0 - alpha) * open) {
                 // The stretch is lit where its light comes from.
                 let stops = 1.0 - open;
                 let t = lit.1 / stops;
@@ -162,7 +163,7 @@ fn pixel(
                 if depth == 1.0 && alpha >= 0.5 {
                     depth = vulkan_depth(view, t / slant);
                 }
-                if ends(colour, alpha) {
+                if ends(colour, 1.0 - alpha) {
                     break;
                 }
                 (open, lit) = (1.0, (DVec3::ZERO, 0.0, 0.0));

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! A is the ambient factor times the gain, at most 1; A' the same, or 1. n is the direction of the gradient of the values, just behind a
-//! cut the normal of what cut. How much of a surface there is, and which side is out, is what opacity does a voxel along n and back.
+//! cut the normal of what cut. How much of a surface there is, and which side is out, is what opacity does a voxel along n and back. The
+//! ambient factor is that of half a voxel out.
 
 use crate::draw::clip_normal::clip_normal;
 use crate::draw::raycast::Frame;
@@ -41,21 +42,46 @@ pub fn shaded(
 ) -> DVec3 {
     let look = &frame.look;
     let [k_a, k_d, k_s] = look.parts().map(f64::from);
-    let open =
-        if look.shading.occluded() { (f64::from(look.gain) * ambient(at.position)).min(1.0) } else { 1.0 };
+    let surface = surface_at(frame, at, direction.normalize(), light);
+    let open = if look.shading.occluded() {
+        let place = std::array::from_fn(|i| at.position[i] + surface.outside[i] / frame.grid.spacing[i]);
+        (f64::from(look.gain) * ambient(place)).min(1.0)
+    } else {
+        1.0
+    };
     let open_rest = if look.occluded == Occluded::All { open } else { 1.0 };
     let colour = at.colour;
-    let [diffuse, specular] = reflected_at(frame, at, direction.normalize(), light);
+    let [diffuse, specular] = surface.back;
     open * k_a * colour + open_rest * (k_d * diffuse * colour + DVec3::splat(k_s * specular))
 }
 
-/// The diffuse and the specular part.
-fn reflected_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> [f64; 2] {
+/// What light finds at a place.
+struct Surface {
+    /// The diffuse and the specular part of what comes back.
+    back: [f64; 2],
+    /// Millimetres from the place to where the ambient factor of its surface is.
+    outside: DVec3,
+}
+
+impl Surface {
+    /// This one, and a share of the other instead.
+    fn mixed(&self, other: &Self, share: f64) -> Self {
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Self {
+            back: std::array::from_fn(|i| mix(self.back[i], other.back[i])),
+            outside: self.outside.lerp(other.outside, share),
+        }
+    }
+}
+
+/// Inside, or just behind what cut.
+fn surface_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> Surface {
     let (entered, face) = entry(frame, at, direction);
     let by_clip = at.cut.filter(|_| at.beside <= entered);
-    let beside = by_clip.map_or(entered, |_| at.beside) / frame.grid.min_spacing();
+    let voxel = frame.grid.min_spacing();
+    let beside = by_clip.map_or(entered, |_| at.beside) / voxel;
     let cut = 1.0 - smoothstep(f64::from(kernel::CUT_HOLDS), f64::from(kernel::CUT_ENDS), beside);
-    let inside = reflected_inside(frame, at, -direction, light);
+    let inside = surface_inside(frame, at, -direction, light);
     if cut == 0.0 {
         return inside;
     }
@@ -63,7 +89,11 @@ fn reflected_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> [f
         clip_normal(&frame.clips[clip].clip, at.world - at.beside * direction, -direction)
     });
     let back = f64::from(u8::from(frame.look.two_sided));
-    mix(inside, reflected(frame, normal, [1.0, back], -direction, light), cut)
+    let of_cut = Surface {
+        back: reflected(frame, normal, [1.0, back], -direction, light),
+        outside: f64::from(kernel::AIR) * voxel * normal,
+    };
+    inside.mixed(&of_cut, cut)
 }
 
 /// Way in mm since a ray came into the volume, were it as large on, and the outer normal of the face.
@@ -81,9 +111,9 @@ fn entry(frame: &Frame, at: &Shown, direction: DVec3) -> (f64, DVec3) {
     found
 }
 
-/// The same inside the volume.
-fn reflected_inside(frame: &Frame, at: &Shown, towards_eye: DVec3, light: DVec3) -> [f64; 2] {
-    let none = [f64::from(kernel::NO_DIRECTION), 0.0];
+/// By the gradient of the values, and by the opacity a voxel before and behind the place along it.
+fn surface_inside(frame: &Frame, at: &Shown, towards_eye: DVec3, light: DVec3) -> Surface {
+    let none = Surface { back: [f64::from(kernel::NO_DIRECTION), 0.0], outside: DVec3::ZERO };
     let Some(normal) = gradient(frame, at.position).try_normalize() else { return none };
     let voxel = frame.grid.min_spacing();
     let opacity = |voxels: f64| {
@@ -96,18 +126,19 @@ fn reflected_inside(frame: &Frame, at: &Shown, towards_eye: DVec3, light: DVec3)
     if change == 0.0 {
         return none;
     }
-    let surface = smoothstep(
-        f64::from(kernel::NO_SURFACE),
-        f64::from(kernel::SURFACE),
-        change / here.max(before).max(behind),
-    );
+    let largest = here.max(before).max(behind);
+    let share = smoothstep(f64::from(kernel::NO_SURFACE), f64::from(kernel::SURFACE), change / largest);
     let out = (before - behind) / change;
     let least = f64::from(u8::from(frame.look.two_sided));
     let sides = [(1.0 + out.min(0.0)).max(least), (1.0 - out.max(0.0)).max(least)];
-    mix(none, reflected(frame, normal, sides, towards_eye, light), surface)
+    let surface = Surface {
+        back: reflected(frame, normal, sides, towards_eye, light),
+        outside: voxel * out * (here / largest).min(f64::from(kernel::AIR)) * normal,
+    };
+    none.mixed(&surface, share)
 }
 
-/// The same of a surface, by the share of it that is turned to the front and to the back of its normal.
+/// The diffuse and the specular part of what comes back from a surface, by the share of it that is turned to the front and to the back of its normal.
 fn reflected(frame: &Frame, normal: DVec3, sides: [f64; 2], towards_eye: DVec3, light: DVec3) -> [f64; 2] {
     let slope = normal.dot(light);
     let arriving = if slope > 0.0 { sides[0] * slope } else { sides[1] * -slope };
@@ -137,8 +168,4 @@ fn gradient(frame: &Frame, position: [f64; 3]) -> DVec3 {
 fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
-}
-
-fn mix(a: [f64; 2], b: [f64; 2], share: f64) -> [f64; 2] {
-    std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
 }
