@@ -9,6 +9,7 @@
 
 use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::brick_distance::BrickDistance;
+use crate::draw::extent::Extent;
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
 use crate::draw::present::Present;
@@ -26,6 +27,7 @@ use cao_model::clip::Clip;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
+use glam::Vec3;
 use std::sync::Mutex;
 
 mod drawing;
@@ -42,6 +44,7 @@ pub struct Renderer {
     brick_distance: BrickDistance,
     /// How far rays may leap.
     distances: Buffer,
+    extent: Extent,
     raycast: Raycast,
     present: Present,
     frame: FrameBuffer,
@@ -68,6 +71,7 @@ impl Renderer {
             ambient: method::of(&subject)?,
             brick_distance: BrickDistance::new(gpu, &subject.field)?,
             distances: BrickDistance::buffer(gpu, &subject.field)?,
+            extent: Extent::new(gpu)?,
             raycast: Raycast::new(gpu, &subject.field)?,
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
@@ -284,6 +288,16 @@ impl Renderer {
     pub fn read_mask(&self) -> Result<Vec<u8>> {
         self.current()?;
         self.ambient.mask(&self.subject)
+    }
+
+    /// How far what is visible, clips and all, reaches along each direction: the largest `d·p` in mm over its points `p`, from the volume's
+    /// centre, index axes ([`crate::draw::extent`]); `None` where nothing is visible. It is what [`Fitting`](cao_model::fit::Fitting)
+    /// asks for. Refuses while out of date. Uses the device's queue and waits for it.
+    pub fn visible_extent(&self, directions: &[Vec3]) -> Result<Option<Vec<f32>>> {
+        self.current()?;
+        let (subject, fields) = (&self.subject, self.ambient.fields());
+        let (occupancy, clip_bricks) = (&subject.occupancy, fields.clip_bricks);
+        self.extent.run(&subject.gpu, &subject.field, fields.opacity, occupancy, clip_bricks, directions)
     }
 
     /// The scene on the device.

@@ -7,6 +7,7 @@ mod classify;
 mod clip_bricks;
 mod clipping;
 mod dilate;
+mod extent;
 mod filter;
 mod lao;
 mod near;

@@ -1,4 +1,5 @@
 //! Pictures.
 
 pub mod brick_distance;
+pub mod extent;
 pub mod raycast;
