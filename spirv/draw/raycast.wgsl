@@ -13,11 +13,13 @@
 @group(0) @binding(7) var<storage, read> distances: Distances;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
+@group(0) @binding(12) var<storage, read> bounds: Bounds;
 
 // a layer a view: premultiplied, linear; Vulkan's 0 ... 1
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
 @group(0) @binding(11) var depths: texture_storage_2d_array<r32float, write>;
 
+#include "shared/bounds.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
@@ -96,6 +98,21 @@ fn ends(colour: vec3<f32>, alpha: f32) -> bool {
     return rest * min(12.92, 0.4396 * pow(darkest, -7.0 / 12.0)) <= frame.remainder;
 }
 
+// The part of a ray that passes what can be seen: how many whole steps lie before it, and the depth at its end. A step and more is left
+// on each side: what comes before a cut counts too, and rounding does not.
+fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
+    let first = bricks - vec3(bounds.from_first[0], bounds.from_first[1], bounds.from_first[2]);
+    let end = vec3(bounds.to_last[0], bounds.to_last[1], bounds.to_last[2]);
+    if end.x == 0u {
+        return vec2(0.0, ray.begin);
+    }
+    // Bricks at the volume's faces reach to them, half a voxel further than their voxels' centres.
+    let low = vec3<f32>(first * BRICK) - 1.0;
+    let high = vec3<f32>(end * BRICK);
+    let part = crossing(ray.start, ray.along, low, high);
+    return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e9), min(ray.end, part.y + ray.step));
+}
+
 // What an eye sees at a place in pixels.
 fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
@@ -109,14 +126,15 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     var colour = vec3(0.0);
     var alpha = 0.0;
     var depth = 1.0;
+    let part = shown_part(ray, bricks);
     // Samples so far, and that number at the last hidden one: integers, for an f32 stops counting at 2^24.
-    var k = 0u;
+    var k = u32(part.x);
     var hidden = 0xffffffffu;
     // The sample at which the last leap over something hidden ended.
     var landed = 0xffffffffu;
     loop {
         let t = ray.begin + (f32(k) + 0.5) * ray.step;
-        if !(t < ray.end) {
+        if !(t < part.y) {
             break;
         }
         let position = start + t * along;

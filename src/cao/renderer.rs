@@ -8,6 +8,7 @@
 //! so that a host embeds them in its frame; `update` and `draw` do the same on the device's own queue and wait.
 
 use crate::ambient::{Ambient, Categories, Changed};
+use crate::draw::bounds::Bounds;
 use crate::draw::brick_distance::BrickDistance;
 use crate::draw::extent::Extent;
 use crate::draw::eyes::FrameBuffer;
@@ -44,6 +45,9 @@ pub struct Renderer {
     brick_distance: BrickDistance,
     /// How far rays may leap.
     distances: Buffer,
+    bounds_of: Bounds,
+    /// Beyond them there is nothing to see.
+    bounds: Buffer,
     extent: Extent,
     raycast: Raycast,
     present: Present,
@@ -71,6 +75,8 @@ impl Renderer {
             ambient: method::of(&subject)?,
             brick_distance: BrickDistance::new(gpu, &subject.field)?,
             distances: BrickDistance::buffer(gpu, &subject.field)?,
+            bounds_of: Bounds::new(gpu)?,
+            bounds: Bounds::buffer(gpu)?,
             extent: Extent::new(gpu)?,
             raycast: Raycast::new(gpu, &subject.field)?,
             present: Present::new(gpu, colour)?,
@@ -185,12 +191,13 @@ impl Renderer {
         parts
     }
 
-    /// How far rays may leap, after new occupancy or clips.
+    /// How far rays may leap, and where they end, after new occupancy or clips.
     fn distances(&self) -> Part<'_> {
         Part::short(stages::DISTANCES, |rec| {
             let (field, occupancy) = (&self.subject.field, &self.subject.occupancy);
             let clip_bricks = self.ambient.fields().clip_bricks;
-            Ok(self.brick_distance.record(rec, field, occupancy, clip_bricks, &self.distances)?)
+            self.brick_distance.record(rec, field, occupancy, clip_bricks, &self.distances)?;
+            Ok(self.bounds_of.record(rec, field, &self.distances, &self.bounds)?)
         })
     }
 

@@ -1,5 +1,6 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
+mod bounds;
 mod brick_distance;
 mod bricks;
 mod carve;

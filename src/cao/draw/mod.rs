@@ -1,5 +1,6 @@
 //! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, attachments of hosts.
 
+pub mod bounds;
 pub mod brick_distance;
 pub mod extent;
 pub mod eyes;

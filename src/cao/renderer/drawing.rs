@@ -52,6 +52,7 @@ impl Renderer {
             opacity: fields.opacity,
             ambient: fields.ambient,
             distances: &self.distances,
+            bounds: &self.bounds,
             clips: &subject.clip_set,
             frame: &self.frame,
         };

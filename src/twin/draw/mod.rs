@@ -1,5 +1,6 @@
 //! Pictures.
 
+pub mod bounds;
 pub mod brick_distance;
 pub mod extent;
 pub mod raycast;
