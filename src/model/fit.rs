@@ -11,8 +11,8 @@
 //! ```
 //!
 //! The maximum over the scene of each is a support. Left and right touch where `T·r` is half the difference of theirs, and then
-//! `D = sum / (2 f t)`; the larger distance of the two pairs counts, and what the other pair holds stays in the middle. `T·k` is the middle
-//! of nearest and farthest.
+//! `D = sum / (2 f t)`; the larger distance of the two pairs counts, and the other pair has the same room on both sides, at its points'
+//! own depths. `T·k` is the middle of nearest and farthest.
 //!
 //! The eyes' distance `b` is comfortable: a point `κ` nearer than the target has a disparity of `b / (D − κ) − b / D` against it, which
 //! is largest for the nearest. `b` is the largest that keeps that to one degree, and at most 1/15 of `D`. An eye sees a point half of
