@@ -13,11 +13,13 @@
 @group(0) @binding(7) var<storage, read> distances: Distances;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
+@group(0) @binding(12) var<storage, read> bounds: Bounds;
 
 // a layer a view: premultiplied, linear; Vulkan's 0 ... 1
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
 @group(0) @binding(11) var depths: texture_storage_2d_array<r32float, write>;
 
+#include "shared/bounds.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
@@ -44,8 +46,8 @@ const TILE = 8u;
 // Part of a step by which a leap ends early: more than rounding moves a sample, so that none behind it is left out.
 const LEAP_MARGIN = 0.1;
 
-// Halvings of a step at a cut: the depth of a face errs by less than 1/64 of it.
-const CUT_HALVINGS = 6u;
+// Halvings of a step at a cut: the depth of a face errs by less than 1/256 of it.
+const CUT_HALVINGS = 8u;
 
 // Parts that a step can be halved into.
 const PARTS = 16u;
@@ -216,6 +218,21 @@ fn cut_between(sides: vec2<f32>, eye: Eye, direction: vec3<f32>) -> vec2<f32> {
     return found;
 }
 
+// The part of a ray that passes what can be seen: how many whole steps lie before it, and the depth at its end. A step and more is left
+// on each side: what comes before a cut counts too, and rounding does not.
+fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
+    let first = bricks - vec3(bounds.from_first[0], bounds.from_first[1], bounds.from_first[2]);
+    let end = vec3(bounds.to_last[0], bounds.to_last[1], bounds.to_last[2]);
+    if end.x == 0u {
+        return vec2(0.0, ray.begin);
+    }
+    // Bricks at the volume's faces reach to them, half a voxel further than their voxels' centres.
+    let low = vec3<f32>(first * BRICK) - 1.0;
+    let high = vec3<f32>(end * BRICK);
+    let part = crossing(ray.start, ray.along, low, high);
+    return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
+}
+
 // What an eye sees at a place in pixels.
 fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
@@ -232,7 +249,8 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     var alpha = 0.0;
     var depth = 1.0;
     // Parts of steps so far, integers so that samples keep their places whatever is leapt over; and how many the next step has.
-    var n = 0u;
+    let shown = shown_part(ray, bricks);
+    var n = PARTS * u32(shown.x);
     var size = PARTS;
     // Up to here the ray is known to be in the bricks that it looked at last.
     var n_out = 0u;
@@ -253,7 +271,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
         // A stretch at a time, so that neighbouring rays are lit together whatever they have passed.
         loop {
             let t = ray.begin + f32(n) * part;
-            over = !(t < ray.end);
+            over = !(t < shown.y);
             let covered = (1.0 - alpha) * (1.0 - open);
             let full = n % PARTS == 0u && (covered > MOST_LIT || t - t_first >= voxel);
             // What is left out of a stretch also moves the place where it is lit: by its share of a voxel, over which light changes by less
@@ -285,7 +303,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
                     n_out = last;
                 }
             }
-            let t_next = select(t, min(ray.begin + f32(n + size) * part, ray.end), known);
+            let t_next = select(t, min(ray.begin + f32(n + size) * part, shown.y), known);
             let next = value_at(start + t_next * along);
             // Whether any value between has opacity.
             if known && max(here, next) > transfer.least && min(here, next) < transfer.most {

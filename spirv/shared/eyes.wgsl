@@ -63,13 +63,10 @@ struct Ray {
     step: f32,
 }
 
-fn ray_through(eye: Eye, uv: vec2<f32>) -> Ray {
-    let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
-    // Index space: the volume is the box from -0.5 to dims - 0.5.
-    let start = index_of(eye.origin.xyz);
-    let along = direction / frame.spacing.xyz;
-    let low = vec3(-0.5) - start;
-    let high = frame.dims.xyz - 0.5 - start;
+// Where a line enters and leaves a box; the first is larger than the second where it misses.
+fn crossing(start: vec3<f32>, along: vec3<f32>, lowest: vec3<f32>, highest: vec3<f32>) -> vec2<f32> {
+    let low = lowest - start;
+    let high = highest - start;
     // Parallel to two faces, a ray is between them all the way or never; in the plane of one the quotient would be 0/0.
     let parallel = along == vec3(0.0);
     let between = (low <= vec3(0.0)) & (high >= vec3(0.0));
@@ -77,12 +74,21 @@ fn ray_through(eye: Eye, uv: vec2<f32>) -> Ray {
     let to_high = select(high / along, select(vec3(-1e30), vec3(1e30), between), parallel);
     let entry = select(min(to_low, to_high), to_low, parallel);
     let leave = select(max(to_low, to_high), to_high, parallel);
+    return vec2(max(entry.x, max(entry.y, entry.z)), min(leave.x, min(leave.y, leave.z)));
+}
+
+fn ray_through(eye: Eye, uv: vec2<f32>) -> Ray {
+    let direction = eye.base.xyz + uv.x * eye.along_u.xyz + uv.y * eye.along_v.xyz;
+    // Index space: the volume is the box from -0.5 to dims - 0.5.
+    let start = index_of(eye.origin.xyz);
+    let along = direction / frame.spacing.xyz;
+    let inside = crossing(start, along, vec3(-0.5), frame.dims.xyz - 0.5);
     return Ray(
         direction,
         start,
         along,
-        max(max(entry.x, max(entry.y, entry.z)), eye.depth.z),
-        min(min(leave.x, min(leave.y, leave.z)), eye.depth.w),
+        max(inside.x, eye.depth.z),
+        min(inside.y, eye.depth.w),
         frame.spacing.w / length(direction),
     );
 }

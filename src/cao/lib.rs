@@ -79,6 +79,7 @@ pub use cao_gpu as gpu;
 pub use cao_model as model;
 
 pub use cao_model::clip::{Clip, Mode, Pose, Shape};
+pub use cao_model::fit::Fitting;
 pub use cao_model::frame::{Frame, Turn};
 pub use cao_model::look::Look;
 pub use cao_model::mesh::TriangleMesh;

@@ -8,7 +8,9 @@
 //! so that a host embeds them in its frame; `update` and `draw` do the same on the device's own queue and wait.
 
 use crate::ambient::{Ambient, Categories, Changed};
+use crate::draw::bounds::Bounds;
 use crate::draw::brick_distance::BrickDistance;
+use crate::draw::extent::Extent;
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
 use crate::draw::present::Present;
@@ -26,6 +28,7 @@ use cao_model::clip::Clip;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
+use glam::Vec3;
 use std::sync::Mutex;
 
 mod drawing;
@@ -42,6 +45,10 @@ pub struct Renderer {
     brick_distance: BrickDistance,
     /// How far rays may leap.
     distances: Buffer,
+    bounds_of: Bounds,
+    /// Beyond them there is nothing to see.
+    bounds: Buffer,
+    extent: Extent,
     raycast: Raycast,
     present: Present,
     frame: FrameBuffer,
@@ -68,6 +75,9 @@ impl Renderer {
             ambient: method::of(&subject)?,
             brick_distance: BrickDistance::new(gpu, &subject.field)?,
             distances: BrickDistance::buffer(gpu, &subject.field)?,
+            bounds_of: Bounds::new(gpu)?,
+            bounds: Bounds::buffer(gpu)?,
+            extent: Extent::new(gpu)?,
             raycast: Raycast::new(gpu, &subject.field)?,
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
@@ -181,12 +191,13 @@ impl Renderer {
         parts
     }
 
-    /// How far rays may leap, after new occupancy or clips.
+    /// How far rays may leap, and where they end, after new occupancy or clips.
     fn distances(&self) -> Part<'_> {
         Part::short(stages::DISTANCES, |rec| {
             let (field, occupancy) = (&self.subject.field, &self.subject.occupancy);
             let clip_bricks = self.ambient.fields().clip_bricks;
-            Ok(self.brick_distance.record(rec, field, occupancy, clip_bricks, &self.distances)?)
+            self.brick_distance.record(rec, field, occupancy, clip_bricks, &self.distances)?;
+            Ok(self.bounds_of.record(rec, field, &self.distances, &self.bounds)?)
         })
     }
 
@@ -284,6 +295,16 @@ impl Renderer {
     pub fn read_mask(&self) -> Result<Vec<u8>> {
         self.current()?;
         self.ambient.mask(&self.subject)
+    }
+
+    /// How far what is visible, clips and all, reaches along each direction: the largest `d·p` in mm over its points `p`, from the volume's
+    /// centre, index axes ([`crate::draw::extent`]); `None` where nothing is visible. It is what [`Fitting`](cao_model::fit::Fitting)
+    /// asks for. Refuses while out of date. Uses the device's queue and waits for it.
+    pub fn visible_extent(&self, directions: &[Vec3]) -> Result<Option<Vec<f32>>> {
+        self.current()?;
+        let (subject, fields) = (&self.subject, self.ambient.fields());
+        let (occupancy, clip_bricks) = (&subject.occupancy, fields.clip_bricks);
+        self.extent.run(&subject.gpu, &subject.field, fields.opacity, occupancy, clip_bricks, directions)
     }
 
     /// The scene on the device.

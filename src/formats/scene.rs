@@ -32,14 +32,15 @@
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
-//!     azimuth_deg = 30                 # frames the volume from this side, about +z from -y; 180: a patient's face
+//!     fit = "visible"                  # frames what is visible after clips; "box": the volume's box, whatever is in it
+//!     azimuth_deg = 30                 # from this side, about +z from -y; 180: a patient's face
 //!     elevation_deg = 25
-//!     distance_mm = 400                # of the eyes from the centre; default: it fills the picture
+//!     distance_mm = 400                # of the eyes from the middle of that; default: it fills the picture
 //!     ## position_mm = [0, -400, 100]   # or a place of one's own, with
 //!     ## target_mm = [0, 0, 0]
 //!     ## up = [0, 0, 1]
-//!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance
-//!     fov_deg = 35                     # vertical
+//!     ipd_mm = 20                      # between the eyes; default: 1/15 of the distance, or less, so that disparities stay below 1 degree
+//!     fov_deg = 35                     # vertical; default: 35 across the shorter side; for box, and eyes at a place of their own, vertically
 //!     screen_mm = 400                  # distance of the plane without parallax; default: the target
 //!
 //!     [image]
@@ -78,6 +79,7 @@ use crate::toml_value::{in_line, number, parse_colour, shown};
 use crate::{Error, Result, file, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::error::{quoted, shown_path};
+use cao_model::fit::{Fit, Fitting};
 use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
@@ -220,9 +222,9 @@ impl OcclusionSettings {
 pub struct Stereo {
     /// Where they are and where they look.
     pub viewpoint: Viewpoint,
-    /// Distance between the eyes in mm; `None` is 1/15 of the distance to the target.
+    /// Distance between the eyes in mm; `None` is 1/15 of the distance to the target, or what [`Fitting`] finds comfortable.
     pub ipd_mm: Option<f32>,
-    /// Vertical field of view in degrees; `None` is that of [`StereoRig::framing`].
+    /// Vertical field of view in degrees; `None` is that of [`StereoRig::framing`] or [`Fitting::rig`].
     pub fov_deg: Option<f32>,
     /// Distance in mm of the plane without parallax; `None` is the distance to the target.
     pub screen_mm: Option<f32>,
@@ -231,13 +233,15 @@ pub struct Stereo {
 /// Where the eyes are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Viewpoint {
-    /// Looking at the volume's centre from this side.
+    /// From this side.
     Framing {
+        /// What is looked at and fills the picture.
+        fit: Fit,
         /// About +z, from -y: of a patient 0 is from behind, 180 at the face.
         azimuth_deg: f32,
         /// Above the xy plane.
         elevation_deg: f32,
-        /// From the centre in mm; `None` lets the volume fill the picture.
+        /// From its middle in mm; `None` lets it fill the picture.
         distance_mm: Option<f32>,
     },
     /// At a place of the user's own.
@@ -253,13 +257,42 @@ pub enum Viewpoint {
 
 impl Default for Stereo {
     fn default() -> Self {
-        let viewpoint = Viewpoint::Framing { azimuth_deg: 30.0, elevation_deg: 25.0, distance_mm: None };
+        let viewpoint = Viewpoint::Framing {
+            fit: Fit::Visible,
+            azimuth_deg: Self::AZIMUTH_DEG,
+            elevation_deg: Self::ELEVATION_DEG,
+            distance_mm: None,
+        };
         Self { viewpoint, ipd_mm: None, fov_deg: None, screen_mm: None }
     }
 }
 
 impl Stereo {
-    /// The rig for a volume of this size in mm along the frame's axes
+    /// The side looked from where nobody names one.
+    pub const AZIMUTH_DEG: f32 = 30.0;
+    /// And the height.
+    pub const ELEVATION_DEG: f32 = 25.0;
+
+    /// What to fit into pictures of this aspect (width / height): `None` where the eyes have a place of their own or frame the box, as
+    /// [`Self::rig`] says.
+    pub fn fitting(&self, aspect: f32) -> Option<Fitting> {
+        match self.viewpoint {
+            Viewpoint::Framing { fit: Fit::Visible, azimuth_deg, elevation_deg, distance_mm } => {
+                Some(Fitting {
+                    azimuth_deg,
+                    elevation_deg,
+                    fov_deg: self.fov_deg,
+                    aspect,
+                    distance_mm,
+                    ipd_mm: self.ipd_mm,
+                    screen_mm: self.screen_mm,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// The rig of eyes at a place of their own, or that frame the box of a volume of this size in mm along the frame's axes
     /// ([`Turn::extent`](cao_model::frame::Turn::extent)).
     pub fn rig(&self, size_mm: [f64; 3]) -> StereoRig {
         let mut rig = match self.viewpoint {
@@ -459,6 +492,7 @@ struct OcclusionFile {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 struct StereoFile {
+    fit: Option<String>,
     azimuth_deg: Option<f64>,
     elevation_deg: Option<f64>,
     distance_mm: Option<f64>,
@@ -697,7 +731,10 @@ impl StereoFile {
                 return Err(Error::refused(key, "has no effect without stereo.position_mm"));
             }
         }
-        let (azimuth, elevation) = (self.azimuth_deg.unwrap_or(30.0), self.elevation_deg.unwrap_or(25.0));
+        let fit = self.fit.as_deref().map_or(Ok(Fit::default()), Fit::parse);
+        let fit = fit.map_err(|error| error.under("stereo"))?;
+        let azimuth = self.azimuth_deg.unwrap_or(Stereo::AZIMUTH_DEG.into());
+        let elevation = self.elevation_deg.unwrap_or(Stereo::ELEVATION_DEG.into());
         if !azimuth.is_finite() {
             return Err(Error::refused(
                 "stereo.azimuth_deg",
@@ -712,6 +749,7 @@ impl StereoFile {
         }
         length("stereo.distance_mm", self.distance_mm, false)?;
         Ok(Viewpoint::Framing {
+            fit,
             azimuth_deg: azimuth as f32,
             elevation_deg: elevation as f32,
             distance_mm: self.distance_mm.map(|mm| mm as f32),
@@ -720,11 +758,12 @@ impl StereoFile {
 
     fn placed(&self, position_mm: Vec3) -> Result<Viewpoint> {
         for (key, unused) in [
-            ("stereo.azimuth_deg", self.azimuth_deg),
-            ("stereo.elevation_deg", self.elevation_deg),
-            ("stereo.distance_mm", self.distance_mm),
+            ("stereo.fit", self.fit.is_some()),
+            ("stereo.azimuth_deg", self.azimuth_deg.is_some()),
+            ("stereo.elevation_deg", self.elevation_deg.is_some()),
+            ("stereo.distance_mm", self.distance_mm.is_some()),
         ] {
-            if unused.is_some() {
+            if unused {
                 return Err(Error::refused(key, "has no effect together with stereo.position_mm"));
             }
         }

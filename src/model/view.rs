@@ -136,19 +136,42 @@ pub struct StereoRig {
     pub screen_mm: Option<f32>,
 }
 
+/// The axes of a head that looks from a side.
+pub(crate) struct Side {
+    /// Away from what it looks at.
+    pub back: Vec3,
+    /// To its right.
+    pub right: Vec3,
+    /// Towards the upper edge of its picture.
+    pub above: Vec3,
+    /// Approximately that, along an axis.
+    pub up: Vec3,
+}
+
+impl Side {
+    /// From the given azimuth (about +z, from −y) and elevation in degrees.
+    pub fn of(azimuth_deg: f32, elevation_deg: f32) -> Self {
+        let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+        let back = Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin());
+        let up = if elevation_deg.abs() > 89.0 { Vec3::Y } else { Vec3::Z };
+        let right = up.cross(back).normalize();
+        Self { back, right, above: back.cross(right), up }
+    }
+}
+
 impl StereoRig {
+    /// Vertical field of view in degrees where nobody asks for another.
+    pub const FOV_DEG: f32 = 35.0;
+
     /// A comfortable distance of the eyes, as a share of that to what they look at.
     pub const PARALLAX: f32 = 1.0 / 15.0;
 
     /// A rig from whose place a volume of this size in mm just fits into a square picture, seen from the given azimuth
-    /// (about +z, from −y) and elevation in degrees. The eyes' distance is 1/15 of the viewing distance, a comfortable parallax.
+    /// (about +z, from −y) and elevation in degrees. The eyes' distance is 1/15 of the viewing distance, a comfortable parallax. To frame
+    /// what is visible of it instead: [`Fitting`](crate::fit::Fitting).
     pub fn framing(size_mm: [f64; 3], azimuth_deg: f32, elevation_deg: f32) -> Self {
-        let fov_deg = 35.0_f32;
-        let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
-        let from = Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin());
-        let up = if elevation_deg.abs() > 89.0 { Vec3::Y } else { Vec3::Z };
-        let right = up.cross(from).normalize();
-        let above = from.cross(right);
+        let fov_deg = Self::FOV_DEG;
+        let Side { back: from, right, above, up } = Side::of(azimuth_deg, elevation_deg);
         // Each corner of the volume asks for its distance; a twentieth is left free around them for the parallax.
         let half = Vec3::from_array(size_mm.map(|s| 0.5 * s as f32));
         let slope = (0.5 * fov_deg).to_radians().tan() / 1.05;

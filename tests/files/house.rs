@@ -214,6 +214,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/error.rs", &[]),
     ("src/model/values.rs", &[]),
     ("src/model/view.rs", &["error"]),
+    ("src/model/fit.rs", &["error", "view"]),
     ("src/model/transfer.rs", &["error", "values"]),
     ("src/model/mesh.rs", &["error"]),
     ("src/model/occlusion.rs", &["error"]),

@@ -137,6 +137,19 @@ fn framing_keeps_its_side_at_another_distance_and_a_comfortable_parallax() {
     assert!((far.rig([1.0; 3]).ipd_mm - 200.0).abs() < 1e-3, "as far away as it may be");
 }
 
+/// Eyes frame what is visible unless the scene gives them a place or asks for the box; what else it says of them stays.
+#[test]
+fn what_is_visible_is_framed_unless_a_scene_says_otherwise() {
+    let fitting = with("[stereo]\nazimuth_deg = 10\nipd_mm = 3\nscreen_mm = 70").stereo.fitting(1.5).unwrap();
+    assert_eq!((fitting.azimuth_deg, fitting.elevation_deg, fitting.aspect), (10.0, 25.0, 1.5));
+    assert_eq!((fitting.ipd_mm, fitting.screen_mm), (Some(3.0), Some(70.0)));
+    assert_eq!((fitting.fov_deg, fitting.distance_mm), (None, None));
+    assert_eq!(with("[stereo]\nfit = \"visible\"").stereo, with("").stereo);
+    for other in ["fit = \"box\"", "position_mm = [9, 0, 0]"] {
+        assert_eq!(with(&format!("[stereo]\n{other}")).stereo.fitting(1.0), None, "{other}");
+    }
+}
+
 #[test]
 fn files_are_found_beside_the_scene() {
     let dir = tempfile::tempdir().unwrap();
@@ -295,6 +308,8 @@ fn impossible_values_are_refused_by_name() {
         ("[stereo]\nazimuth_deg = inf", "stereo.azimuth_deg: inf: expected"),
         ("[stereo]\ntarget_mm = [0, 0, 0]", "stereo.target_mm: has no effect without stereo.position_mm"),
         ("[stereo]\nposition_mm = [9, 0, 0]\nazimuth_deg = 3", "stereo.azimuth_deg: has no effect"),
+        ("[stereo]\nposition_mm = [9, 0, 0]\nfit = \"visible\"", "stereo.fit: has no effect"),
+        ("[stereo]\nfit = \"all\"", "stereo.fit: \"all\"; expected visible or box"),
         ("[stereo]\nposition_mm = [0, 0, 0]", "stereo.target_mm: "),
         ("[stereo]\nposition_mm = [0, 0, 9]", "stereo.up: "),
         ("[image]\nwidth = 0", "image.width: 0: expected 1 to 16384 pixels"),

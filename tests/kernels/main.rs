@@ -1,5 +1,6 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
+mod bounds;
 mod brick_distance;
 mod bricks;
 mod carve;
@@ -7,6 +8,7 @@ mod classify;
 mod clip_bricks;
 mod clipping;
 mod dilate;
+mod extent;
 mod filter;
 mod lao;
 mod near;

@@ -6,6 +6,7 @@ use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
+use cao::draw::bounds::Bounds;
 use cao::draw::brick_distance::BrickDistance;
 use cao::draw::eyes::FrameBuffer;
 use cao::draw::picture::Picture;
@@ -433,6 +434,7 @@ struct Stages {
     frame: FrameBuffer,
     raycast: Raycast,
     distances: Buffer,
+    bounds: Buffer,
 }
 
 impl Stages {
@@ -448,11 +450,13 @@ impl Stages {
             frame: FrameBuffer::new(gpu).unwrap(),
             raycast: Raycast::new(gpu, &field).unwrap(),
             distances: BrickDistance::buffer(gpu, &field).unwrap(),
+            bounds: Bounds::buffer(gpu).unwrap(),
             field,
         };
         let (opacity, occupancy) = (Opacity::new(gpu).unwrap(), Occupancy::new(gpu).unwrap());
         let clip_bricks = ClipBricks::new(gpu).unwrap();
         let distance = BrickDistance::new(gpu, &stages.field).unwrap();
+        let bounds = Bounds::new(gpu).unwrap();
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
         stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, 50.0, MAPS).unwrap();
@@ -468,6 +472,7 @@ impl Stages {
             distance
                 .record(rec, &stages.field, &stages.occupancy, &volumes.clip_bricks, &stages.distances)
                 .unwrap();
+            bounds.record(rec, &stages.field, &stages.distances, &stages.bounds).unwrap();
         });
         stages
     }
@@ -483,16 +488,36 @@ impl Stages {
         bytemuck::pod_collect_to_vec(&read_buffer(gpu, &self.distances))
     }
 
-    /// Left and right colour and depth as bytes, with these words of the bricks' distances.
+    /// The box of what shows something: bricks from the first on, and to the last.
+    fn bounds(&self, gpu: &Gpu) -> [u32; 6] {
+        bytemuck::pod_read_unaligned(&read_buffer(gpu, &self.bounds))
+    }
+
+    /// Left and right colour and depth as bytes, with these words of the bricks' distances; every ray goes through all of the volume.
     fn draw(&self, gpu: &Gpu, views: &[View; 2], look: &Look, distances: &[u32]) -> Vec<Vec<u8>> {
+        let [x, y, z] = self.field.bricks();
+        self.draw_within(gpu, views, look, distances, [x, y, z, x, y, z])
+    }
+
+    /// The same with rays that end where these bounds do.
+    fn draw_within(
+        &self,
+        gpu: &Gpu,
+        views: &[View; 2],
+        look: &Look,
+        distances: &[u32],
+        bounds: [u32; 6],
+    ) -> Vec<Vec<u8>> {
         let picture = Picture::new(gpu, SIZE, 2).unwrap();
         let Picture { colour, depth } = &picture;
         let distances = buffer(gpu, "words", bytemuck::cast_slice(distances));
+        let bounds = buffer(gpu, "bounds", bytemuck::bytes_of(&bounds));
         let bindings = Bindings {
             field: &self.field,
             transfer: &self.transfer,
             ambient: &self.volumes.ambient,
             distances: &distances,
+            bounds: &bounds,
             clips: &self.clips,
             frame: &self.frame,
         };
@@ -612,6 +637,41 @@ fn leaping_over_empty_and_clipped_space_changes_no_bit() {
         assert!(shown > 0, "{name}");
     }
     assert!(hidden > 20, "only {hidden} bricks with opacity are wholly clipped");
+    close(gpu);
+}
+
+/// Rays that end where what shows something ends change no bit of a picture either; one brick less, on any side, and they do.
+#[test]
+fn bounds_change_no_bit_and_wrong_ones_are_caught() {
+    const SEED: u64 = 33;
+    let gpu = open();
+    let mut random = Random::new(SEED);
+    let (mut smaller, mut caught) = (0, [0; 6]);
+    for (name, volume, clips) in sparse_scenes() {
+        let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+        let stages = Stages::new(&gpu, &volume, &transfer, &clips);
+        let (words, bounds) = (stages.distances(&gpu), stages.bounds(&gpu));
+        let bricks = stages.field.bricks();
+        smaller += (0..6).filter(|&i| bounds[i] < bricks[i % 3]).count();
+        for (n, views) in pairs_of_views(&mut random, &volume).iter().enumerate() {
+            for step in [0.5, 0.95, 3.0] {
+                let look = Look { step_mm: Some(step), ..Look::default() };
+                let whole = stages.draw(&gpu, views, &look, &words);
+                let draw = |bounds| stages.draw_within(&gpu, views, &look, &words, bounds);
+                let differ = differing(&draw(bounds), &whole);
+                assert_eq!(differ, 0, "{name} seed {SEED} views {n} step {step}: {:?}", views[0]);
+                if step == 0.5 {
+                    for (i, caught) in caught.iter_mut().enumerate() {
+                        let mut less = bounds;
+                        less[i] -= 1;
+                        *caught += differing(&draw(less), &whole);
+                    }
+                }
+            }
+        }
+    }
+    assert!(smaller > 6, "only {smaller} sides are nearer than the volume's");
+    assert!(caught.iter().all(|differ| *differ > 50), "{caught:?}");
     close(gpu);
 }
 

@@ -358,6 +358,44 @@ fn volumes_are_drawn_with_flags_alone_also_negative_ones_and_the_smallest() {
     }
 }
 
+/// What is visible fills the picture, also of what clips leave; the volume's box only for whom asks for it, or where nothing is.
+#[test]
+fn what_is_visible_is_framed_and_the_box_for_whom_asks() {
+    let folder = Folder::with_device();
+    let volume = "render builtin:fruit:32 --size 64x64 --solid";
+    let rest = "--clip box --clip-mode keep --clip-scale 5 --clip-translate 8,0,0";
+    // Columns of the left eye that show something.
+    let width = |flags: &str| {
+        folder.ok(&format!("{volume} {flags} --eyes l.png,r.png"));
+        let picture = picture(&folder, "l.png");
+        let ground = *picture.get_pixel(0, 0);
+        (0..64).filter(|x| (0..64).any(|y| *picture.get_pixel(*x, y) != ground)).count()
+    };
+    let all = width("--azimuth 0 --elevation 0");
+    let (left, in_box) =
+        (width(&format!("{rest} --azimuth 0")), width(&format!("{rest} --azimuth 0 --fit box")));
+    // 80 to 90 % of 64 pixels, and two that show less than one sees.
+    assert!((51..=60).contains(&all) && (48..=60).contains(&left), "{all} {left}");
+    // 10 of 32 mm.
+    assert!((12..=26).contains(&in_box), "{in_box}");
+
+    folder.put("box.toml", "volume = \"builtin:fruit:32\"\n[stereo]\nfit = \"box\"");
+    folder.ok("render box.toml --size 64x64 --solid --eyes a.png,r.png");
+    folder.ok(&format!("{volume} --fit box --eyes b.png,r.png"));
+    folder.ok("render box.toml --size 64x64 --solid --fit visible --eyes c.png,r.png");
+    folder.ok(&format!("{volume} --eyes d.png,r.png"));
+    let [a, b, c, d] = ["a.png", "b.png", "c.png", "d.png"].map(|name| picture(&folder, name));
+    assert!(a == b && c == d && a != c);
+
+    let nothing = folder.run(&format!("{volume} --clip sphere --clip-scale 100 -o n.png"));
+    assert_eq!(nothing.code, Some(0), "{}", nothing.err);
+    assert!(
+        nothing.err.contains("warning: nothing is visible") && nothing.err.contains("box"),
+        "{}",
+        nothing.err
+    );
+}
+
 /// From a hundredth of an atom to the moon: the same numbers on another grid are the same picture, and verified alike.
 #[test]
 fn volumes_of_any_size_are_drawn_and_verified_alike() {

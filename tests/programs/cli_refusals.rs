@@ -291,6 +291,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
         ("render builtin:engine:8 -o s.png --size 64", &["--size", "WIDTHxHEIGHT"]),
         ("render builtin:engine:8 -o s.png --elevation 100", &["--elevation", "-90 to 90"]),
         ("render builtin:engine:8 -o s.png --azimuth inf", &["--azimuth", "degrees"]),
+        ("render builtin:engine:8 -o s.png --fit patient", &["--fit", "visible or box"]),
         ("render builtin:engine:8 -o s.png --distance 0", &["--distance", "> 0 mm"]),
         ("render builtin:engine:8 -o s.png --shading phong --budget-ms 3", &["--shading", "--budget-ms"]),
         ("render builtin:engine:8 -o s.png --ipd -1", &["--ipd", ">= 0 mm"]),

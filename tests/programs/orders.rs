@@ -94,15 +94,33 @@ fn right_is_right_from_behind_and_the_head_is_up_however_oblique_the_grid() {
             // LAS, a mirror image in its index axes.
             folder.put("a.nrrd", balls(rotation, &[place]).in_order(LAS).nrrd("RAS"));
             for (azimuth, seen) in [0, 180, 90].into_iter().zip(seen) {
-                let flags = format!("--azimuth {azimuth} --elevation 0 --distance 60");
+                let flags = format!("--fit box --azimuth {azimuth} --elevation 0 --distance 60");
                 let found = middle(&draw(&folder, "a.nrrd", &flags)).unwrap();
-                // 60 mm away, 64 pixels are 38 mm at the centre.
+                // 60 mm away from the box's centre, 64 pixels are 38 mm at the centre.
                 for axis in 0..2 {
                     let expected = seen[axis] * 6.0 * 64.0 / 38.0;
                     let off = (found[axis] - expected).abs();
                     assert!(off < 1.5, "{place} at azimuth {azimuth}: {found:?}, expected {seen:?}");
                 }
             }
+        }
+    }
+}
+
+/// Eyes that frame what is visible find it on the patient's axes too: one ball, wherever it is, is in the middle and fills the picture.
+#[test]
+fn what_is_visible_is_framed_however_oblique_the_grid() {
+    let folder = folder();
+    for place in [DVec3::new(6.0, 3.0, -4.0), DVec3::new(-5.0, -2.0, 6.0)] {
+        for rotation in [DQuat::IDENTITY, oblique()] {
+            folder.put("a.nrrd", balls(rotation, &[place]).in_order(LAS).nrrd("RAS"));
+            let picture = draw(&folder, "a.nrrd", "--azimuth 120 --elevation 35");
+            let [x, y] = middle(&picture).unwrap();
+            // Of 64 pixels; the ball is 7 voxels across, of which a row on each side fades out.
+            assert!(x.abs() < 3.0 && y.abs() < 3.0, "{place}: {x}, {y}");
+            let seen = |x, y| picture.get_pixel(x, y).0[1] > picture.get_pixel(0, 0).0[1] + 50;
+            let columns = (0..64).filter(|x| (0..64).any(|y| seen(*x, y))).count();
+            assert!((45..=60).contains(&columns), "{place}: {columns} columns");
         }
     }
 }
@@ -117,7 +135,7 @@ fn clips_light_and_eyes_of_flags_and_scenes_are_on_the_axes_of_the_patient() {
     let (right, left) = (DVec3::new(7.0, 0.0, 0.0), DVec3::new(-7.0, 0.0, 0.0));
     for rotation in [DQuat::IDENTITY, oblique()] {
         folder.put("a.nii", balls(rotation, &[right, left]).in_order(LAS).nifti());
-        let from_behind = "--azimuth 0 --elevation 0 --distance 60";
+        let from_behind = "--fit box --azimuth 0 --elevation 0 --distance 60";
         // A plane removes the side that it faces: turned by 90 degrees about y, the right.
         let clip = "--clip plane --clip-rotate 0,90,0";
         let [x, _] = middle(&draw(&folder, "a.nii", &format!("{from_behind} {clip}"))).unwrap();

@@ -6,6 +6,7 @@ use cao_gpu::Gpu;
 use cao_measure::exactness::{Plan, verify};
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::fit::Fitting;
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
@@ -14,8 +15,8 @@ use cao_model::view::{StereoRig, View};
 use cao_testing::*;
 use glam::Vec3;
 
-/// What a scene shows: ambient factors, opacities, both eyes.
-type Shown = (Vec<f32>, Vec<f32>, StereoImage);
+/// What a scene shows: ambient factors, opacities, both eyes as they frame the box, and as they frame what is visible.
+type Shown = (Vec<f32>, Vec<f32>, StereoImage<4>);
 
 /// A scene with every length that there is, each times `unit`.
 fn shown(gpu: &Gpu, method: Method, unit: f32) -> Shown {
@@ -49,9 +50,21 @@ fn shown(gpu: &Gpu, method: Method, unit: f32) -> Shown {
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap();
     renderer.set_clips(&clips).unwrap();
     renderer.update(&mut |_| ()).unwrap();
-    let rig = StereoRig::framing(volume.size_mm(), 30.0, 25.0);
-    let reach = 3.0 * rig.position.length();
-    let views: [View; 2] = rig.views(1.0, 1e-3 * reach, reach).unwrap();
+    let fitting = Fitting {
+        azimuth_deg: 30.0,
+        elevation_deg: 25.0,
+        fov_deg: None,
+        aspect: 1.0,
+        distance_mm: None,
+        ipd_mm: None,
+        screen_mm: None,
+    };
+    let fitted = fitting.rig(|ways| renderer.visible_extent(ways)).unwrap().unwrap();
+    let eyes = [StereoRig::framing(volume.size_mm(), 30.0, 25.0), fitted].map(|rig| {
+        let reach = 3.0 * rig.position.length();
+        rig.views(1.0, 1e-3 * reach, reach).unwrap()
+    });
+    let views: [View; 4] = [eyes[0][0], eyes[0][1], eyes[1][0], eyes[1][1]];
     let look = Look { step_mm: Some(0.3 * unit), ..Look::default() };
     let (image, _) = renderer.draw(&views, &look, [40, 36]).unwrap();
     (renderer.read_ambient().unwrap(), renderer.read_opacity().unwrap(), image)
@@ -80,7 +93,7 @@ fn a_scene_in_units_of_a_power_of_two_is_the_same_to_the_bit() {
 #[test]
 fn a_scene_in_any_units_is_the_same_picture() {
     let gpu = open();
-    let pixels = |image: &StereoImage| -> Vec<u8> {
+    let pixels = |image: &StereoImage<4>| -> Vec<u8> {
         let eyes = image.colour.iter().map(|eye| Picture::over(image.size[0], image.size[1], eye, [0.0; 3]));
         eyes.flat_map(|eye| eye.pixels).flatten().collect()
     };

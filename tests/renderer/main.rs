@@ -8,6 +8,7 @@ mod edits;
 mod embed;
 mod exactness;
 mod failures;
+mod fit;
 mod frames;
 mod host;
 mod leaks;

@@ -1,6 +1,8 @@
-//! Pictures: eyes, ray cast, how far its rays may leap, attachments of hosts.
+//! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, attachments of hosts.
 
+pub mod bounds;
 pub mod brick_distance;
+pub mod extent;
 pub mod eyes;
 pub mod filter;
 pub mod picture;

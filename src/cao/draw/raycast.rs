@@ -1,7 +1,7 @@
 //! Stage 6 of CAO §3.5: all views by ray casting, in one dispatch, an invocation a pixel, into a layer each of a picture.
 //!
-//! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i`, `α = 1 − (1 − a)^(Δ/ℓ)`, L by `spirv/shared/shading.wgsl`. In: `volume`, `transfer`,
-//! `ambient` V_AO, `distances`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
+//! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i`, `α = 1 − exp ∫ ln(1 − a) dt/ℓ`, L by `spirv/shared/shading.wgsl`. In: `volume`, `transfer`,
+//! `ambient` V_AO, `distances`, `bounds`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
 //! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
 
 use crate::Result;
@@ -25,6 +25,8 @@ pub struct Bindings<'a> {
     pub ambient: &'a Image,
     /// How far rays may leap.
     pub distances: &'a Buffer,
+    /// Beyond which nothing is to be seen.
+    pub bounds: &'a Buffer,
     /// The clips.
     pub clips: &'a ClipSet,
     /// The frame.
@@ -62,6 +64,7 @@ impl Raycast {
             edge: &self.edge,
             frame: &b.frame.buffer,
             distances: b.distances,
+            bounds: b.bounds,
             clips: &b.clips.clips,
             layers: &b.clips.layers,
             colours: &picture.colour,

@@ -51,6 +51,7 @@ impl Renderer {
             transfer: &subject.transfer_buffer,
             ambient: fields.ambient,
             distances: &self.distances,
+            bounds: &self.bounds,
             clips: &subject.clip_set,
             frame: &self.frame,
         };

@@ -7,6 +7,7 @@ use cao_measure::stability::Trial;
 use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
 use cao_model::error::shown_path;
+use cao_model::fit::Fit;
 use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
@@ -183,16 +184,19 @@ pub struct Render {
     /// the index axes as stored [default: the scene's, patient]
     #[arg(long, value_name = "patient|index", value_parser = |s: &str| Frame::parse(s))]
     pub frame: Option<Frame>,
+    /// What fills the picture. visible: what is visible, after clips; box: the volume's box, whatever is in it [default: visible]
+    #[arg(long, value_name = "visible|box", value_parser = |s: &str| Fit::parse(s))]
+    pub fit: Option<Fit>,
     /// Look from this side: degrees about +z, from -y; a patient's face is at 180 [default: 30]
     #[arg(long, value_name = "DEG", value_parser = angle, allow_hyphen_values = true)]
     pub azimuth: Option<f32>,
     /// Look from this height: -90 to 90 degrees above the xy plane [default: 25]
     #[arg(long, value_name = "DEG", value_parser = elevation, allow_hyphen_values = true)]
     pub elevation: Option<f32>,
-    /// Distance of the head from the volume's centre in mm [default: the volume fills the picture]
+    /// Distance of the head in mm from the middle of what is visible, or of the box [default: it fills the picture]
     #[arg(long, value_name = "MM", value_parser = positive, allow_hyphen_values = true)]
     pub distance: Option<f32>,
-    /// Distance between the eyes in mm [default: 1/15 of that distance]
+    /// Distance between the eyes in mm [default: 1/15 of that distance, or less, so that disparities stay below 1 degree]
     #[arg(long, value_name = "MM", value_parser = length, allow_hyphen_values = true)]
     pub ipd: Option<f32>,
     /// Light that is shown: none, the colours alone; phong, ambient, diffuse and specular; ao, colours times ambient occlusion; phong+ao,

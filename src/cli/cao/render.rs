@@ -6,11 +6,15 @@ use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
-use cao_formats::scene::{Scene, Viewpoint};
+use cao_formats::scene::{Scene, Stereo, Viewpoint};
 use cao_formats::{Outputs, Picture};
 use cao_model::error::shown_path;
+use cao_model::fit::{Fit, Fitting};
+use cao_model::frame::Turn;
 use cao_model::methods::Method;
+use cao_model::view::StereoRig;
 use clap::ArgMatches;
+use glam::Vec3;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -50,9 +54,14 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         setup.occlusion.radius_mm = 0.0;
     }
     let size = [scene.image.width, scene.image.height];
-    let rig = turn.rig(&scene.stereo.rig(turn.extent(volume.size_mm())));
-    let reach = rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>();
-    let views = rig.views(size[0] as f32 / size[1] as f32, reach * 1e-4, reach * 2.0)?;
+    let aspect = size[0] as f32 / size[1] as f32;
+    let views = |rig: &StereoRig| {
+        let reach = rig.position.length() + volume.size_mm().iter().map(|s| *s as f32).sum::<f32>();
+        rig.views(aspect, reach * 1e-4, reach * 2.0)
+    };
+    // What is visible is known after the work, and impossible eyes before it.
+    let unfitted = turn.rig(&scene.stereo.rig(turn.extent(volume.size_mm())));
+    views(&unfitted)?;
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
@@ -62,6 +71,9 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
     progress.stage("drawing");
+    let fitting = scene.stereo.fitting(aspect);
+    let rig = fitting.map_or(Ok(None), |fitting| fitted(&renderer, &fitting, turn))?.unwrap_or(unfitted);
+    let views = views(&rig)?;
     let (image, draw) = renderer.draw(&views, &look, size)?;
     timings.extend(draw);
     check_validation(&gpu)?;
@@ -84,6 +96,22 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The eyes that frame what is visible after an update, on the volume's axes; none where nothing is.
+fn fitted(renderer: &Renderer, fitting: &Fitting, turn: Turn) -> Result<Option<StereoRig>> {
+    let reach = |ways: &[Vec3]| {
+        let ways: Vec<Vec3> = ways.iter().map(|way| turn.vector(*way)).collect();
+        renderer.visible_extent(&ways)
+    };
+    let rig = fitting.rig(reach)?;
+    if rig.is_none() {
+        cao_cli::say(
+            "warning: nothing is visible, so the volume's box is framed; other clips or another transfer function (--transfer) would show \
+             something",
+        );
+    }
+    Ok(rig.map(|rig| turn.rig(&rig)))
 }
 
 /// Flags win over the scene file; clips from flags are added to the scene's.
@@ -112,12 +140,17 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     if let Some([width, height]) = args.size {
         (scene.image.width, scene.image.height) = (width, height);
     }
-    if args.azimuth.is_some() || args.elevation.is_some() || args.distance.is_some() {
-        let (mut azimuth, mut elevation, mut distance) = (30.0, 25.0, None);
-        if let Viewpoint::Framing { azimuth_deg, elevation_deg, distance_mm } = scene.stereo.viewpoint {
-            (azimuth, elevation, distance) = (azimuth_deg, elevation_deg, distance_mm);
+    let side = [args.azimuth, args.elevation, args.distance];
+    if args.fit.is_some() || side.iter().any(Option::is_some) {
+        let (mut fit, mut distance) = (Fit::default(), None);
+        let (mut azimuth, mut elevation) = (Stereo::AZIMUTH_DEG, Stereo::ELEVATION_DEG);
+        if let Viewpoint::Framing { fit: what, azimuth_deg, elevation_deg, distance_mm } =
+            scene.stereo.viewpoint
+        {
+            (fit, azimuth, elevation, distance) = (what, azimuth_deg, elevation_deg, distance_mm);
         }
         scene.stereo.viewpoint = Viewpoint::Framing {
+            fit: args.fit.unwrap_or(fit),
             azimuth_deg: args.azimuth.unwrap_or(azimuth),
             elevation_deg: args.elevation.unwrap_or(elevation),
             distance_mm: args.distance.or(distance),

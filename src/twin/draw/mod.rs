@@ -1,7 +1,9 @@
 //! Pictures.
 
+pub mod bounds;
 pub mod brick_distance;
 pub mod clip_normal;
+pub mod extent;
 pub mod raycast;
 pub mod segment;
 pub mod shading;
