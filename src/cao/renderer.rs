@@ -31,9 +31,11 @@ use std::sync::Mutex;
 mod drawing;
 #[cfg(test)]
 mod failures;
+mod read_back;
 
+pub use crate::draw::band::Bands;
 pub use crate::draw::picture::COLOUR;
-pub use drawing::StereoImage;
+pub use read_back::StereoImage;
 
 /// Renders one volume.
 pub struct Renderer {

@@ -48,21 +48,13 @@ fn read<T: bytemuck::Pod>(gpu: &Gpu, image: &Image, layer: u32) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&back.read(0, bytes).unwrap())
 }
 
-/// Value of a binary16.
-fn half(bits: u16) -> f32 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023) / 1024.0);
-    let value =
-        if exponent == 0 { fraction * 2f32.powi(-14) } else { (1.0 + fraction) * 2f32.powi(exponent - 15) };
-    if bits >> 15 == 1 { -value } else { value }
-}
-
 /// Components of a layer.
 fn components(gpu: &Gpu, image: &Image, layer: u32) -> Vec<f32> {
     match image.desc().format {
         Format::Rgba8Unorm => {
             read::<u8>(gpu, image, layer).into_iter().map(|b| f32::from(b) / 255.0).collect()
         }
-        Format::Rgba16Float => read::<u16>(gpu, image, layer).into_iter().map(half).collect(),
+        Format::Rgba16Float => read::<u16>(gpu, image, layer).into_iter().map(half_float).collect(),
         _ => read(gpu, image, layer),
     }
 }

@@ -6,6 +6,7 @@ use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
+use cao::draw::band::Band;
 use cao::draw::brick_distance::BrickDistance;
 use cao::draw::eyes::FrameBuffer;
 use cao::draw::picture::Picture;
@@ -498,7 +499,8 @@ impl Stages {
             rec.discard(depth);
             self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
-            self.raycast.record(rec, bindings, &picture).unwrap();
+            let band = Band::whole(SIZE);
+            self.raycast.record(rec, bindings, &picture, band, 0..band.tiles()).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
             for (n, back) in backs.iter().enumerate() {
                 let image = if n < 2 { colour } else { depth };

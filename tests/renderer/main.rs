@@ -1,6 +1,7 @@
 //! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, failures, leaks, budgets.
 
 mod adopt;
+mod bands;
 mod calls;
 mod consistency;
 mod contextual;

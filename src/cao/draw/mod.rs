@@ -1,5 +1,6 @@
-//! Pictures: eyes, ray cast, how far its rays may leap, attachments of hosts.
+//! Pictures: eyes, ray cast, how far its rays may leap, bands of it, attachments of hosts.
 
+pub mod band;
 pub mod brick_distance;
 pub mod eyes;
 pub mod filter;
