@@ -208,8 +208,19 @@ fn is_inside(texel: vec2<u32>) -> bool {
     return all(texel < vec2(params.size.x, params.rows));
 }
 
+// The mean of a pixel's samples, and the depth of the one nearest to its centre.
 fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
-    return seen(frame.eye[view], vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5);
+    let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
+    var mean = Pixel(vec4(0.0), 1.0);
+    for (var i = 0u; i < frame.samples; i++) {
+        let pair = frame.places[i / 2u];
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u));
+        mean.colour += frame.share * one.colour;
+        if i == 0u {
+            mean.depth = one.depth;
+        }
+    }
+    return mean;
 }
 
 @compute @workgroup_size(TILE, TILE)

@@ -1,6 +1,7 @@
 //! Pictures: linear, premultiplied pixels over a background, to 8-bit sRGB, to PNG.
 
-use crate::{Error, Output, Result, write_atomic};
+use crate::outputs::{Output, write_atomic};
+use crate::{Error, Result};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};

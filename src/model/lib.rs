@@ -13,6 +13,7 @@ pub mod mesh;
 pub mod methods;
 pub mod occlusion;
 pub mod order;
+pub mod samples;
 pub mod settings;
 pub mod transfer;
 pub mod values;

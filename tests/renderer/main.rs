@@ -17,5 +17,6 @@ mod limits;
 mod methods;
 mod planner;
 mod real_data;
+mod samples;
 mod scenes;
 mod stability;

@@ -92,6 +92,7 @@ impl Renderer {
         take: &mut dyn FnMut(u32, &StereoImage<VIEWS>) -> Result<(), E>,
     ) -> Result<Timings, E> {
         self.current()?;
+        look.check().map_err(Error::from)?;
         let Some(most) = bands.iter().next() else { return Ok(Timings::new()) };
         let mut drawing = Drawing::new(self, views, look, [bands.size[0], most.rows])?;
         let mut image = StereoImage::with_room([bands.size[0], most.rows]);
@@ -128,7 +129,7 @@ impl<'a> Drawing<'a> {
             look,
             picture,
             read_back: gpu.buffer("image read-back", bytes, BufferUse::Readback)?,
-            slice: Slice::of(FIRST_RAYS / (TILE.pow(2) * views.len() as u32)),
+            slice: Slice::of(FIRST_RAYS / (TILE.pow(2) * views.len() as u32 * look.samples.max(1))),
             timings: Timings::new(),
         })
     }

@@ -126,6 +126,8 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     }
     scene.stereo.ipd_mm = args.ipd.or(scene.stereo.ipd_mm);
     scene.look.occluded &= !args.solid;
+    scene.look.samples = args.samples.unwrap_or(scene.look.samples);
+    scene.look.filter = args.filter.unwrap_or(scene.look.filter);
     Ok(())
 }
 
