@@ -9,6 +9,7 @@
 
 use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::brick_distance::BrickDistance;
+use crate::draw::budget::Controller;
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
 use crate::draw::present::Present;
@@ -34,6 +35,7 @@ mod failures;
 mod read_back;
 
 pub use crate::draw::band::Bands;
+pub use crate::draw::budget::{Drawn, Quality};
 pub use crate::draw::picture::COLOUR;
 pub use read_back::StereoImage;
 
@@ -49,6 +51,8 @@ pub struct Renderer {
     frame: FrameBuffer,
     /// What is presented; kept from frame to frame.
     presented: Mutex<Option<Picture>>,
+    /// What frames with a budget can afford.
+    controller: Mutex<Controller>,
     changed: Changed,
     pace: Pace,
     /// Times of preparing clip meshes since the last update.
@@ -74,6 +78,7 @@ impl Renderer {
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
             presented: Mutex::new(None),
+            controller: Mutex::new(Controller::default()),
             subject,
             changed: Changed::ALL,
             pace: Pace::default(),

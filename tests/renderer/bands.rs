@@ -65,7 +65,9 @@ fn no_bit_depends_on_the_bands() {
     // Neither is a multiple of a tile; the second takes several submissions a band.
     for size in [[37, 29], [203, 181]] {
         let picture = Picture::new(&gpu, size, 2).unwrap();
-        run(&gpu, |rec| renderer.record_picture(rec, &views, &Look::default(), &picture).unwrap());
+        run(&gpu, |rec| {
+            renderer.record_picture(rec, &views, &Look::default(), &picture).unwrap();
+        });
         let recorded = StereoImage {
             size,
             colour: [0, 1].map(|layer| read(&gpu, &picture.colour, layer)),

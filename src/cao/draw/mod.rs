@@ -1,7 +1,8 @@
-//! Pictures: eyes, ray cast, how far its rays may leap, bands of it, attachments of hosts.
+//! Pictures: eyes, ray cast, how far its rays may leap, bands of it, what a frame affords, attachments of hosts.
 
 pub mod band;
 pub mod brick_distance;
+pub mod budget;
 pub mod eyes;
 pub mod filter;
 pub mod picture;

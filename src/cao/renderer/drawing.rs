@@ -2,6 +2,7 @@
 
 use super::Renderer;
 use crate::draw::band::Band;
+use crate::draw::budget::{Drawn, Quality};
 use crate::draw::picture::Picture;
 use crate::draw::raycast::Bindings;
 use crate::stages;
@@ -15,15 +16,45 @@ use std::sync::PoisonError;
 impl Renderer {
     /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
     /// can read it afterwards. Refuses while the ambient volume is out of date.
+    ///
+    /// Returns what is drawn: with [`Look::budget_ms`] that may be a part of the picture, its upper left, and samples may lie farther apart;
+    /// else it is all of it. [`Self::drew`] takes it with the time that it took.
     pub fn record_picture(
         &self,
         rec: &mut Recorder,
         views: &[View],
         look: &Look,
         picture: &Picture,
-    ) -> Result<()> {
-        let band = Band::whole(picture.size());
-        self.record_tiles(rec, views, look, picture, band, 0..band.tiles())
+    ) -> Result<Drawn> {
+        self.current()?;
+        look.check()?;
+        let drawn = self.affordable(look, picture.size());
+        let look = Look { step_mm: Some(drawn.step_mm), ..*look };
+        let band = Band::whole(drawn.size);
+        self.record_tiles(rec, views, &look, picture, band, 0..band.tiles())?;
+        Ok(drawn)
+    }
+
+    /// What the look's budget allows of a picture of this size.
+    fn affordable(&self, look: &Look, size: [u32; 2]) -> Drawn {
+        let voxel = self.subject.field.min_spacing();
+        let step = look.step(voxel);
+        let quality = look.budget_ms.map_or(Quality::FULL, |ms| {
+            let mut controller = self.controller.lock().unwrap_or_else(PoisonError::into_inner);
+            // Samples at most a voxel apart: beyond, thin things are missed.
+            controller.choose(f64::from(ms), voxel / step)
+        });
+        let part = |pixels: u32| (pixels as f32 * quality.scale).ceil().max(1.0) as u32;
+        // A float holds no larger number of pixels exactly; all of them are all of them.
+        let size = if quality.scale == 1.0 { size } else { size.map(part) };
+        Drawn { size, step_mm: step * quality.coarser, quality }
+    }
+
+    /// Says how long a drawing took that [`Self::record_picture`] or [`Self::record_draw`] recorded, in ms: for looks with a budget, whose
+    /// later drawings are chosen by it. Times may come late and need not come for every frame. They are
+    /// [`Recorded::timings`](cao_gpu::Recorded::timings)`.of(Phase::Draw)`, or what the host measured itself.
+    pub fn drew(&self, drawn: &Drawn, ms: f64) {
+        self.controller.lock().unwrap_or_else(PoisonError::into_inner).learn(&drawn.quality, ms);
     }
 
     /// Records these tiles of a band, after the eyes and what else a band begins with where they are its first.
@@ -74,7 +105,8 @@ impl Renderer {
     }
 
     /// Records the same into as many layers of attachments: `colour` of the renderer's format, `depth` of `D32Float`. The picture between
-    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then.
+    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then. Where a look's budget allows
+    /// less than all pixels, the attachments are filled all the same, colours interpolated, depths those of the nearest pixel.
     pub fn record_draw(
         &self,
         rec: &mut Recorder,
@@ -83,7 +115,7 @@ impl Renderer {
         colour: &Image,
         depth: &Image,
         size: [u32; 2],
-    ) -> Result<()> {
+    ) -> Result<Drawn> {
         self.current()?;
         let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
@@ -92,10 +124,10 @@ impl Renderer {
             None => Picture::new(&self.subject.gpu, size, views.len())?,
         };
         let picture = presented.insert(picture);
-        self.record_picture(rec, views, look, picture)?;
+        let drawn = self.record_picture(rec, views, look, picture)?;
         rec.stage(stages::PRESENT)?;
-        self.present.record(rec, picture, colour, depth)?;
+        self.present.record(rec, picture, drawn.size, colour, depth)?;
         rec.end_stage()?;
-        Ok(())
+        Ok(drawn)
     }
 }

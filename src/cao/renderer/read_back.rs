@@ -93,6 +93,11 @@ impl Renderer {
     ) -> Result<Timings, E> {
         self.current()?;
         look.check().map_err(Error::from)?;
+        if look.budget_ms.is_some() {
+            let problem =
+                "is for frames that a host records; draw with None, or use record_draw or record_picture";
+            return Err(Error::refused("budget_ms", problem).into());
+        }
         let Some(most) = bands.iter().next() else { return Ok(Timings::new()) };
         let mut drawing = Drawing::new(self, views, look, [bands.size[0], most.rows])?;
         let mut image = StereoImage::with_room([bands.size[0], most.rows]);
