@@ -131,6 +131,9 @@ mod tests {
     use super::*;
     use std::collections::VecDeque;
 
+    /// Milliseconds of a frame's number and quality.
+    type Device<'a> = &'a dyn Fn(u32, &Quality) -> f64;
+
     /// Draws frames on a device that takes `time` of a frame's number and quality, and tells its times two frames late; returns the
     /// qualities and the times.
     fn simulate(
@@ -208,7 +211,7 @@ mod tests {
         let fixed = |n: u32, q: &Quality| (4.0 + 9.0 * q.cost()) * noise(n);
         let steep = |n: u32, q: &Quality| 24.0 * q.cost().powf(1.6) * noise(n);
         let edge = |n: u32, q: &Quality| 10.0 * q.cost() * noise(n);
-        let devices: [&dyn Fn(u32, &Quality) -> f64; 3] = [&fixed, &steep, &edge];
+        let devices: [Device; 3] = [&fixed, &steep, &edge];
         for (i, device) in devices.into_iter().enumerate() {
             let frames = simulate(&mut Controller::default(), 10.0, 2000, device);
             let changes = changes(&frames);
