@@ -13,11 +13,13 @@
 @group(0) @binding(7) var<storage, read> distances: Distances;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
-@group(0) @binding(12) var<storage, read> bounds: Bounds;
+@group(0) @binding(2) var<storage, read> bounds: Bounds;
 
 // a layer a view: premultiplied, linear; Vulkan's 0 ... 1
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
 @group(0) @binding(11) var depths: texture_storage_2d_array<r32float, write>;
+// the colours of `half_floats`: WGSL states a storage image's format, so that each has an entry point
+@group(0) @binding(12) var half_colours: texture_storage_2d_array<rgba16float, write>;
 
 #include "shared/bounds.wgsl"
 #include "shared/bricks.wgsl"
@@ -30,6 +32,12 @@ struct RaycastParams {
     size: vec2<u32>,
     // 1: the device filters these texels too coarsely, so values are interpolated here
     by_hand: u32,
+    // the band: the view's row that is the images' first, and how many rows they hold
+    first_row: u32,
+    rows: u32,
+    // tiles of the band to draw, counted along its rows of tiles
+    first_tile: u32,
+    tiles: u32,
 }
 
 struct Pixel {
@@ -385,12 +393,52 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     return Pixel(vec4(colour, alpha), clamp(depth, 0.0, 1.0));
 }
 
-@compute @workgroup_size(TILE, TILE)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(id.xy >= params.size) {
-        return;
+// The texel of an invocation; outside of the images where there is none. A workgroup takes a tile of one view.
+fn texel_of(group: vec3<u32>, local: vec2<u32>) -> vec2<u32> {
+    let item = item_of_group(group);
+    if item >= params.tiles {
+        return params.size;
     }
-    let pixel = seen(frame.eye[id.z], vec2<f32>(id.xy) + 0.5);
-    textureStore(colours, id.xy, id.z, pixel.colour);
-    textureStore(depths, id.xy, id.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    let tile = params.first_tile + item;
+    let across = (params.size.x + TILE - 1u) / TILE;
+    return TILE * vec2(tile % across, tile / across) + local;
+}
+
+fn is_inside(texel: vec2<u32>) -> bool {
+    return all(texel < vec2(params.size.x, params.rows));
+}
+
+// The mean of a pixel's samples, and the depth of the one nearest to its centre.
+fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
+    let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
+    var mean = Pixel(vec4(0.0), 1.0);
+    for (var i = 0u; i < frame.samples; i++) {
+        let pair = frame.places[i / 2u];
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u));
+        mean.colour += frame.share * one.colour;
+        if i == 0u {
+            mean.depth = one.depth;
+        }
+    }
+    return mean;
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z);
+        textureStore(colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z);
+        textureStore(half_colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
 }

@@ -3,6 +3,10 @@
 // Views drawn at once.
 const MOST_VIEWS = 4u;
 
+// Samples of a pixel, and vectors that hold the places of two each.
+const MOST_SAMPLES = 256u;
+const PAIRS_OF_SAMPLES = 128u;
+
 struct Eye {
     // position in mm
     origin: vec4<f32>,
@@ -43,6 +47,10 @@ struct Frame {
     // value = texel * scale + bias
     bias: f32,
     scale: f32,
+    // samples of a pixel, what each weighs, and where they lie, in pixels from its centre; the first is the nearest to it
+    share: f32,
+    samples: u32,
+    places: array<vec4<f32>, PAIRS_OF_SAMPLES>,
 }
 
 fn index_of(world: vec3<f32>) -> vec3<f32> {

@@ -3,7 +3,7 @@
 use crate::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Stage, Timing, Timings};
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What earlier frames may still be doing when an update begins, and what the update may do.
 const ANYTHING: [Access; 8] = [
@@ -191,7 +191,7 @@ fn together(gpu: &Gpu, parts: &[Part], pace: &mut Pace, timings: &mut Timings) -
 }
 
 /// Parts of one stage in a row have one time.
-fn add(timings: &mut Timings, stage: Stage, ms: f64) {
+pub fn add(timings: &mut Timings, stage: Stage, ms: f64) {
     match timings.0.last_mut() {
         Some(last) if last.stage == stage => last.ms += ms,
         _ => timings.push(stage, ms),
@@ -208,6 +208,30 @@ fn read_count(gpu: &Gpu, Items { count, at, .. }: Items) -> Result<u32> {
     Ok(bytemuck::pod_read_unaligned(&read_back.read(0, 4)?))
 }
 
+/// How many items to take at a time, so that a submission takes a tenth of a second.
+pub struct Slice(u32);
+
+impl Slice {
+    /// So many at first.
+    pub fn of(first: u32) -> Self {
+        Self(first.max(1))
+    }
+
+    /// How many to take of those that are left.
+    pub fn of_these(&self, left: u32) -> u32 {
+        self.0.min(left)
+    }
+
+    /// How long it took with so many.
+    pub fn took(&mut self, items: u32, time: Duration) {
+        let pace = TENTH_MS / (1e3 * time.as_secs_f64()).max(0.1);
+        // A few that are left over at an end say little of many.
+        if items == self.0 || pace < 1.0 {
+            self.0 = (f64::from(items) * pace.clamp(0.25, 4.0)).clamp(1.0, 1e7) as u32;
+        }
+    }
+}
+
 /// Has `record` record some of `count` items at a time on the device's own queue, `first` of them at first, then as many as take a tenth of
 /// a second; tells `progress` the share done (0 … 1). Waits for the end; returns the device's time in ms.
 pub fn in_parts(
@@ -218,9 +242,9 @@ pub fn in_parts(
     record: &mut dyn FnMut(&mut Recorder, Range<u32>) -> Result<()>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<f64> {
-    let (mut part, mut done, mut total_ms) = (first.max(1), 0, 0.0);
+    let (mut slice, mut done, mut total_ms) = (Slice::of(first), 0, 0.0);
     while done < count {
-        let now = part.min(count - done);
+        let now = slice.of_these(count - done);
         let mut rec = gpu.recorder(stage.name)?;
         rec.barrier(&ANYTHING, &ANYTHING);
         rec.stage(stage)?;
@@ -230,8 +254,7 @@ pub fn in_parts(
         total_ms += rec.submit_and_wait()?.total();
         done += now;
         progress(f64::from(done) / f64::from(count));
-        let pace = TENTH_MS / (1e3 * start.elapsed().as_secs_f64()).max(0.1);
-        part = (f64::from(now) * pace.clamp(0.25, 4.0)).clamp(1.0, 1e7) as u32;
+        slice.took(now, start.elapsed());
     }
     Ok(total_ms)
 }
@@ -240,6 +263,23 @@ pub fn in_parts(
 mod tests {
     use super::*;
     use crate::stages::{BRICKS, LAO};
+
+    #[test]
+    fn slices_grow_to_a_tenth_of_a_second() {
+        // Items of a millisecond each, then of five.
+        let (mut slice, mut longest) = (Slice::of(3), 0);
+        for ms in [1, 1, 1, 1, 1, 5, 5, 5] {
+            let items = slice.of_these(1000);
+            longest = longest.max(ms * u64::from(items));
+            slice.took(items, Duration::from_millis(ms * u64::from(items)));
+        }
+        assert_eq!((slice.of_these(1000), slice.of_these(7), longest), (20, 7, 500));
+        // What is left at a band's end says nothing; what takes long does.
+        slice.took(1, Duration::from_millis(1));
+        assert_eq!(slice.of_these(1000), 20);
+        slice.took(2, Duration::from_secs(9));
+        assert_eq!(slice.of_these(1000), 1);
+    }
 
     #[test]
     fn what_was_never_seen_takes_no_known_time() {

@@ -10,6 +10,7 @@
 use crate::ambient::{Ambient, Categories, Changed};
 use crate::draw::bounds::Bounds;
 use crate::draw::brick_distance::BrickDistance;
+use crate::draw::budget::Controller;
 use crate::draw::extent::Extent;
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
@@ -34,9 +35,12 @@ use std::sync::Mutex;
 mod drawing;
 #[cfg(test)]
 mod failures;
+mod read_back;
 
+pub use crate::draw::band::Bands;
+pub use crate::draw::budget::{Drawn, Quality};
 pub use crate::draw::picture::COLOUR;
-pub use drawing::StereoImage;
+pub use read_back::StereoImage;
 
 /// Renders one volume.
 pub struct Renderer {
@@ -54,6 +58,8 @@ pub struct Renderer {
     frame: FrameBuffer,
     /// What is presented; kept from frame to frame.
     presented: Mutex<Option<Picture>>,
+    /// What frames with a budget can afford.
+    controller: Mutex<Controller>,
     changed: Changed,
     pace: Pace,
     /// Times of preparing clip meshes since the last update.
@@ -82,6 +88,7 @@ impl Renderer {
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
             presented: Mutex::new(None),
+            controller: Mutex::new(Controller::default()),
             subject,
             changed: Changed::ALL,
             pace: Pace::default(),

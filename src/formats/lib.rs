@@ -14,7 +14,6 @@ mod grid;
 mod gzip;
 pub mod input;
 mod listing;
-mod memory;
 mod metaimage;
 mod nifti;
 mod nrrd;
@@ -35,8 +34,8 @@ pub mod volume;
 mod write;
 
 pub use error::{Error, Result};
-pub use outputs::{Outputs, write_atomic};
-pub use picture::Picture;
+pub use outputs::{Output, Outputs, write_atomic};
+pub use picture::{GrowingPng, Picture};
 pub use raw::read_raw;
 pub use reading::{NoNumbers, Opened, Reading};
 pub use scene::Scene;

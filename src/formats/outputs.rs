@@ -12,6 +12,30 @@ use crate::{Error, Result};
 use atomic_write_file::AtomicWriteFile;
 use cao_model::error::shown_path;
 
+/// A file on its way. What goes wrong is an error of the system, without the file's name.
+#[derive(Debug)]
+pub struct Output {
+    path: PathBuf,
+    out: BufWriter<Stoppable>,
+}
+
+impl Output {
+    /// The name that it is to have.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
 /// Files that are written together.
 #[derive(Debug)]
 pub struct Outputs {
@@ -61,14 +85,41 @@ impl Outputs {
     /// # Errors
     /// [`Error::Io`] naming `path`; also when it exists and is not a regular file.
     pub fn write(&mut self, path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
-        let write = || {
-            let file = AtomicWriteFile::open(place(path)?)?;
-            let mut out = BufWriter::with_capacity(1 << 16, Stoppable { file, stop: self.stop });
-            fill(&mut out)?;
-            Ok(out.into_inner().map_err(|error| error.into_error())?.file)
-        };
-        self.files.push((path.into(), write().map_err(Error::io(path))?));
+        let mut output = self.open(path)?;
+        fill(&mut output).map_err(Error::io(path))?;
+        self.keep(output)
+    }
+
+    /// Begins a file, for who writes several at a time; [`Outputs::keep`] takes it when it is complete.
+    ///
+    /// # Errors
+    /// As [`Outputs::write`].
+    pub fn open(&self, path: &Path) -> Result<Output> {
+        let open = || AtomicWriteFile::open(place(path)?);
+        let file = open().map_err(Error::io(path))?;
+        let out = BufWriter::with_capacity(1 << 16, Stoppable { file, stop: self.stop });
+        Ok(Output { path: path.into(), out })
+    }
+
+    /// Takes a complete file; it gets its name in [`Outputs::commit`].
+    ///
+    /// # Errors
+    /// As [`Outputs::write`].
+    pub fn keep(&mut self, Output { path, out }: Output) -> Result<()> {
+        let written = out.into_inner().map_err(|error| error.into_error()).map_err(Error::io(&path))?;
+        self.files.push((path, written.file));
         Ok(())
+    }
+
+    /// Refuses to go on from the moment that writing fails: between long pieces of work.
+    ///
+    /// # Errors
+    /// That it was interrupted.
+    pub fn go_on(&self) -> io::Result<()> {
+        match (self.stop)() {
+            true => Err(io::Error::other("interrupted")),
+            false => Ok(()),
+        }
     }
 
     /// Gives all files their names. Everything that takes room on the disk has happened before the first has its own.
@@ -87,6 +138,7 @@ impl Outputs {
     }
 }
 
+#[derive(Debug)]
 struct Stoppable {
     file: AtomicWriteFile,
     stop: fn() -> bool,

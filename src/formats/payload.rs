@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use crate::parts::Parts;
 use crate::reading::Frame;
 use crate::volume::bad;
-use crate::{Error, Result, file, gzip, memory};
+use crate::{Error, Result, file, gzip};
 use cao_model::error::{quoted, shown_path};
 use cao_model::values::{Endian, Kind, Values};
 
@@ -95,7 +95,7 @@ impl Payload {
             OpenPart::open(&self.parts, number, header, field)?.check_possible(self, share)?;
         }
         let bytes = need_bytes(self, count as u64);
-        if memory::available().is_some_and(|available| bytes > available) {
+        if cao_model::memory::available().is_some_and(|available| bytes > available) {
             return Err(too_large(count.to_string()));
         }
         let mut values =

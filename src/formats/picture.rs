@@ -1,8 +1,10 @@
 //! Pictures: linear, premultiplied pixels over a background, to 8-bit sRGB, to PNG.
 
-use crate::write_atomic;
+use crate::outputs::{Output, write_atomic};
 use crate::{Error, Result};
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// 8-bit sRGB pixels, rows from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,18 +42,14 @@ impl Picture {
 
     /// The picture as a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let mut png = std::io::Cursor::new(Vec::new());
-        let bytes = self.pixels.as_flattened();
-        image::write_buffer_with_format(
-            &mut png,
-            bytes,
-            self.width,
-            self.height,
-            image::ExtendedColorType::Rgb8,
-            image::ImageFormat::Png,
-        )
-        .map_err(|e| Error::refused("picture", e.to_string()))?;
-        Ok(png.into_inner())
+        let mut png = Vec::new();
+        let write = |file| {
+            let mut file = begin(file, self.width, self.height)?;
+            file.write_image_data(self.pixels.as_flattened())?;
+            file.finish()
+        };
+        write(&mut png).map_err(|error| Error::refused("picture", error.to_string()))?;
+        Ok(png)
     }
 
     /// Writes a PNG; nothing is left behind on failure.
@@ -59,6 +57,73 @@ impl Picture {
         let png = self.png()?;
         write_atomic(path, |file| file.write_all(&png))
     }
+}
+
+/// A PNG file that grows downwards, some rows at a time, and takes little memory, whatever its size.
+pub struct GrowingPng {
+    /// The encoder does not give its file back.
+    file: Arc<Mutex<Output>>,
+    path: PathBuf,
+    rows: png::StreamWriter<'static, Shared>,
+}
+
+impl GrowingPng {
+    /// Begins a picture of this size.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file; also for a size that PNG does not have.
+    pub fn new(file: Output, width: u32, height: u32) -> Result<Self> {
+        let path = file.path().to_owned();
+        let file = Arc::new(Mutex::new(file));
+        let rows = begin(Shared(file.clone()), width, height).and_then(|file| file.into_stream_writer());
+        match rows {
+            Ok(rows) => Ok(Self { file, path, rows }),
+            Err(error) => Err(Error::io(&path)(error.into())),
+        }
+    }
+
+    /// Adds pixels, along its rows.
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file; also for more than the picture has.
+    pub fn add(&mut self, pixels: &[[u8; 3]]) -> Result<()> {
+        self.rows.write_all(pixels.as_flattened()).map_err(Error::io(&self.path))
+    }
+
+    /// Completes the file, for [`Outputs::keep`](crate::Outputs::keep).
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming the file; also for less than the picture has.
+    pub fn finish(self) -> Result<Output> {
+        let Self { file, path, rows } = self;
+        rows.finish().map_err(|error| Error::io(&path)(error.into()))?;
+        let file = Arc::into_inner(file).ok_or_else(|| io::Error::other("is still being written"));
+        let file = file.map_err(Error::io(&path))?;
+        Ok(file.into_inner().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// A file that two hold.
+struct Shared(Arc<Mutex<Output>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).flush()
+    }
+}
+
+/// The head of a PNG file.
+fn begin<W: Write>(file: W, width: u32, height: u32) -> Result<png::Writer<W>, png::EncodingError> {
+    let mut encoder = png::Encoder::new(file, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder.write_header()
 }
 
 /// sRGB transfer curve (IEC 61966-2-1), to 8 bits.

@@ -47,6 +47,8 @@
 //!     width = 1024                     # of one eye
 //!     height = 1024
 //!     step_mm = 0.5                    # between samples of a ray; default: a quarter of the smallest spacing
+//!     samples = 16                     # rays of a pixel, 1 to 256; their mean is shown
+//!     filter = "box"                   # how they are spread: over the pixel; "gaussian": as a bell, of sigma half a pixel
 //!     background = "#17191d"
 //!
 //!     [shading]
@@ -84,6 +86,7 @@ use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::samples::{Filter, MOST_SAMPLES};
 use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
@@ -377,6 +380,7 @@ impl Scene {
         }
         let clips = file.clip.into_iter().enumerate();
         let step_mm = file.image.step_mm.map(|mm| mm as f32);
+        let (samples, filter) = file.image.samples()?;
         let (volume, reading) = volume(file.volume, base)?;
         Ok(Self {
             volume,
@@ -389,7 +393,7 @@ impl Scene {
             occlusion: file.occlusion.read()?,
             stereo: file.stereo.read()?,
             image: file.image.read()?,
-            look: Look { step_mm, ..file.shading.read()? },
+            look: Look { step_mm, samples, filter, ..file.shading.read()? },
         })
     }
 
@@ -510,6 +514,8 @@ struct ImageFile {
     width: Option<i64>,
     height: Option<i64>,
     step_mm: Option<f64>,
+    samples: Option<i64>,
+    filter: Option<String>,
     background: Option<Value>,
 }
 
@@ -787,6 +793,18 @@ impl StereoFile {
 }
 
 impl ImageFile {
+    fn samples(&self) -> Result<(u32, Filter)> {
+        let samples = match self.samples {
+            None => Look::default().samples,
+            Some(n) if (1..=i64::from(MOST_SAMPLES)).contains(&n) => n as u32,
+            Some(n) => {
+                return Err(Error::refused("image.samples", format!("{n}: expected 1 to {MOST_SAMPLES}")));
+            }
+        };
+        let filter = self.filter.as_deref().map_or(Ok(Filter::default()), Filter::parse);
+        Ok((samples, filter.map_err(|error| error.under("image"))?))
+    }
+
     fn read(self) -> Result<ImageSettings> {
         let default = ImageSettings::default();
         let pixels = |key: &str, value: Option<i64>, default: u32| match value {

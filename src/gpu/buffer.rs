@@ -128,6 +128,14 @@ impl Buffer {
         self.mapped(offset, length, |bytes| bytes.to_vec())
     }
 
+    /// Copies as many bytes as `into` has from `offset` (bytes) of a mapped buffer. The device must have finished writing them.
+    ///
+    /// # Errors
+    /// As [`Buffer::read`].
+    pub fn read_into(&self, offset: u64, into: &mut [u8]) -> Result<()> {
+        self.mapped(offset, into.len() as u64, |bytes| into.copy_from_slice(bytes))
+    }
+
     fn mapped<T>(&self, offset: u64, length: u64, action: impl FnOnce(&mut [u8]) -> T) -> Result<T> {
         self.0.check_range(offset, length)?;
         let mut memory = self.0.memory.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,5 +1,5 @@
 //! The plain data of `cao`: volumes, transfer functions, clips, views, ray sets, settings and the list of methods. Nothing here
-//! touches a device or a file; lengths are mm, angles degrees, arrays `[x, y, z]` with x fastest in memory.
+//! touches a device or a file, but for the system's word on how much memory there is; lengths are mm, angles degrees, arrays `[x, y, z]` with x fastest in memory.
 
 #![forbid(unsafe_code)]
 
@@ -9,10 +9,12 @@ pub mod error;
 pub mod fit;
 pub mod frame;
 pub mod look;
+pub mod memory;
 pub mod mesh;
 pub mod methods;
 pub mod occlusion;
 pub mod order;
+pub mod samples;
 pub mod settings;
 pub mod transfer;
 pub mod values;

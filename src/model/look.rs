@@ -1,8 +1,9 @@
 //! How a picture looks: light, and the samples along its rays.
 
 use crate::error::quoted;
+use crate::samples::{Filter, MOST_SAMPLES, offsets};
 use crate::{Error, Result};
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 /// Which parts of the light a picture shows, so that they can be compared (CAO §4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +110,14 @@ pub struct Look {
     /// A ray ends where what remains of it cannot change an 8-bit sRGB pixel, over any background, by more than this many
     /// levels of 255; 0: only where nothing remains.
     pub tolerance: f32,
+    /// Rays of a pixel, 1 … 256: the colour is their mean, premultiplied and linear, the depth that of the one nearest to the pixel's
+    /// centre. One goes through the centre.
+    pub samples: u32,
+    /// How they are spread; the same in every pixel, view and frame.
+    pub filter: Filter,
+    /// What a recorded drawing is to take, ms: resolution and distance of samples follow from the times of former ones, which the host
+    /// tells. `None`: always full quality.
+    pub budget_ms: Option<f32>,
 }
 
 impl Default for Look {
@@ -126,6 +135,9 @@ impl Default for Look {
             gain: 2.0,
             step_mm: None,
             tolerance: 0.5,
+            samples: 1,
+            filter: Filter::default(),
+            budget_ms: None,
         }
     }
 }
@@ -162,6 +174,11 @@ impl Look {
         self.step_mm.unwrap_or(0.25 * min_spacing)
     }
 
+    /// Places of a pixel's samples, in pixels from its centre, the nearest first.
+    pub fn offsets(&self) -> Vec<Vec2> {
+        offsets(self.samples, self.filter)
+    }
+
     /// Refuses impossible values.
     pub fn check(&self) -> Result<()> {
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
@@ -182,6 +199,12 @@ impl Look {
         }
         if self.light.try_normalize().is_none() {
             return refuse("shading.light", format!("{}; expected a direction", self.light));
+        }
+        if !(1..=MOST_SAMPLES).contains(&self.samples) {
+            return refuse("image.samples", format!("{}; expected 1 to {MOST_SAMPLES}", self.samples));
+        }
+        if let Some(ms) = self.budget_ms.filter(|ms| !(ms.is_finite() && *ms > 0.0)) {
+            return refuse("budget_ms", format!("{ms}; expected a time > 0 ms"));
         }
         match self.step_mm {
             Some(step) if !(step.is_finite() && step > 0.0) => {

@@ -1,6 +1,6 @@
 //! Output files: all of them whole or none, under the names they were given; and which files were read.
 
-use cao_formats::{Outputs, input};
+use cao_formats::{GrowingPng, Outputs, Picture, input};
 use cao_model::error::shown_path;
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -94,5 +94,37 @@ fn names_are_shown_without_what_a_terminal_would_obey() {
         ("two\nlines\r\t\u{7f}\u{9b}", "two\\nlines\\r\\t\\u{7f}\\u{9b}"),
     ] {
         assert_eq!(shown_path(name), shown);
+    }
+}
+
+/// A picture written some rows at a time; with too few or too many of them it is refused by name.
+#[test]
+fn a_picture_that_grows_is_the_whole_one() {
+    let pixels: Vec<[u8; 3]> = (0..35).map(|i| [i, 7 * i, 90 - i]).collect();
+    let whole = Picture { width: 5, height: 7, pixels };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grown.png");
+    let grow = |pieces: &[&[[u8; 3]]]| -> cao_formats::Result<()> {
+        let mut outputs = Outputs::default();
+        let mut png = GrowingPng::new(outputs.open(&path)?, 5, 7)?;
+        pieces.iter().try_for_each(|piece| png.add(piece))?;
+        outputs.keep(png.finish()?)?;
+        outputs.commit()
+    };
+    let (top, rest) = whole.pixels.split_at(5);
+    grow(&[top, rest]).unwrap();
+    let read = |png: Vec<u8>| {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut bytes).unwrap();
+        assert_eq!((info.width, info.height), (5, 7));
+        bytes
+    };
+    assert_eq!(read(std::fs::read(&path).unwrap()), whole.pixels.as_flattened());
+    assert_eq!(read(whole.png().unwrap()), whole.pixels.as_flattened());
+    std::fs::remove_file(&path).unwrap();
+    for wrong in [&[top, top][..], &[top, rest, top]] {
+        let error = grow(wrong).unwrap_err().to_string();
+        assert!(error.contains("grown.png") && !path.exists(), "{error}");
     }
 }

@@ -315,6 +315,8 @@ fn impossible_values_are_refused_by_name() {
         ("[image]\nwidth = 0", "image.width: 0: expected 1 to 16384 pixels"),
         ("[image]\nheight = 99999", "image.height: 99999: expected 1 to 16384 pixels"),
         ("[image]\nstep_mm = -1", "image.step_mm: -1: expected a length > 0 mm"),
+        ("[image]\nsamples = 257", "image.samples: 257: expected 1 to 256"),
+        ("[image]\nfilter = \"tent\"", "image.filter: \"tent\": expected box or gaussian"),
         ("[image]\nbackground = \"black\"", "image.background: \"black\": expected \"#rrggbb\""),
         ("[shading]\nambient = -1", "shading.ambient: -1: expected a number from 0 to 10"),
         ("[shading]\ndiffuse = nan", "shading.diffuse: NaN: expected a number from 0 to 10"),

@@ -2,8 +2,8 @@
 
 use cao::draw::picture::Picture;
 use cao::draw::present::Present;
-use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao::renderer::{COLOUR, Drawn, Quality, Renderer};
+use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
 use cao_model::builtin::builtin_box;
 use cao_model::look::Look;
 use cao_model::settings::Setup;
@@ -48,21 +48,13 @@ fn read<T: bytemuck::Pod>(gpu: &Gpu, image: &Image, layer: u32) -> Vec<T> {
     bytemuck::pod_collect_to_vec(&back.read(0, bytes).unwrap())
 }
 
-/// Value of a binary16.
-fn half(bits: u16) -> f32 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023) / 1024.0);
-    let value =
-        if exponent == 0 { fraction * 2f32.powi(-14) } else { (1.0 + fraction) * 2f32.powi(exponent - 15) };
-    if bits >> 15 == 1 { -value } else { value }
-}
-
 /// Components of a layer.
 fn components(gpu: &Gpu, image: &Image, layer: u32) -> Vec<f32> {
     match image.desc().format {
         Format::Rgba8Unorm => {
             read::<u8>(gpu, image, layer).into_iter().map(|b| f32::from(b) / 255.0).collect()
         }
-        Format::Rgba16Float => read::<u16>(gpu, image, layer).into_iter().map(half).collect(),
+        Format::Rgba16Float => read::<u16>(gpu, image, layer).into_iter().map(half_float).collect(),
         _ => read(gpu, image, layer),
     }
 }
@@ -109,6 +101,72 @@ fn attachments_hold_the_picture_rounded_to_their_format() {
     close(gpu);
 }
 
+/// A budget that nothing meets gives half of the pixels along each axis; attachments are filled with them, interpolated.
+#[test]
+fn a_smaller_picture_fills_the_attachments() {
+    let gpu = open();
+    let renderer = renderer(&gpu, COLOUR);
+    let (views, look) = (views(2), Look { budget_ms: Some(1e-6), ..Look::default() });
+    let [colour, depth] = attachments(&gpu, COLOUR, 2);
+    let picture = Picture::new(&gpu, SIZE, 2).unwrap();
+    let frame = |rec: &mut Recorder, look: &Look| {
+        rec.discard(&colour);
+        rec.discard(&depth);
+        rec.barrier(&[], &[Access::AttachmentWrite]);
+        renderer.record_draw(rec, &views, look, &colour, &depth, SIZE).unwrap()
+    };
+    // Nothing is known of the first frame.
+    let mut drawn = Vec::new();
+    run(&gpu, |rec| drawn.push(frame(rec, &look)));
+    assert_eq!((drawn[0].size, drawn[0].quality), (SIZE, Quality::FULL));
+    renderer.drew(&drawn[0], 5.0);
+    run(&gpu, |rec| {
+        drawn.push(frame(rec, &look));
+        drawn.push(renderer.record_picture(rec, &views, &look, &picture).unwrap());
+    });
+    assert!(drawn[1] == drawn[2]);
+    let Drawn { size, step_mm, quality } = drawn[1];
+    assert_eq!((size, step_mm, quality.scale), ([19, 15], 1.0, 0.5));
+    // 5 ms for all pixels, a quarter of the samples on a quarter of the pixels.
+    assert!((quality.expected_ms.unwrap() - 5.0 / 16.0).abs() < 1e-3, "{quality:?}");
+    for layer in 0..2 {
+        let found: Vec<[f32; 4]> = read(&gpu, &colour, layer);
+        let depths: Vec<f32> = read(&gpu, &depth, layer);
+        let (small, far): (Vec<[f32; 4]>, Vec<f32>) =
+            (read(&gpu, &picture.colour, layer), read(&gpu, &picture.depth, layer));
+        let at = |x: f32, y: f32| {
+            let x = (x as usize).min(size[0] as usize - 1);
+            x + (y as usize).min(size[1] as usize - 1) * SIZE[0] as usize
+        };
+        for (i, (found, depth)) in found.iter().zip(&depths).enumerate() {
+            let place = [i as u32 % SIZE[0], i as u32 / SIZE[0]];
+            let [x, y] = [0, 1].map(|a| (place[a] as f32 + 0.5) * size[a] as f32 / SIZE[a] as f32);
+            assert_eq!(*depth, far[at(x, y)], "depth of {place:?}");
+            let (x, y) = (x - 0.5, y - 0.5);
+            let [wx, wy] = [x - x.floor(), y - y.floor()];
+            let load = |dx: f32, dy: f32| small[at((x.floor() + dx).max(0.0), (y.floor() + dy).max(0.0))];
+            let corners = [load(0.0, 0.0), load(1.0, 0.0), load(0.0, 1.0), load(1.0, 1.0)];
+            let weights = [(1.0 - wx) * (1.0 - wy), wx * (1.0 - wy), (1.0 - wx) * wy, wx * wy];
+            for c in 0..4 {
+                let expected: f32 = (0..4).map(|n| weights[n] * corners[n][c]).sum();
+                // Rounding of the place, a 10⁻⁶th of a pixel, and of sums.
+                assert!((found[c] - expected).abs() < 1e-5, "{place:?}: {found:?} for {expected}");
+            }
+        }
+        assert!(found.iter().any(|c| c[3] > 0.5));
+    }
+    // Stills have no budget.
+    let two = [views[0], views[1]];
+    let error = renderer.draw(&two, &look, SIZE).unwrap_err().to_string();
+    assert!(error.contains("budget_ms") && error.contains("record_draw"), "{error}");
+    let none = Look { budget_ms: Some(0.0), ..look };
+    let mut rec = gpu.recorder("refused").unwrap();
+    let error = renderer.record_picture(&mut rec, &views, &none, &picture).unwrap_err().to_string();
+    assert!(error.contains("budget_ms: 0"), "{error}");
+    drop((rec, colour, depth, picture, renderer));
+    close(gpu);
+}
+
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     let gpu = open();
@@ -125,7 +183,7 @@ fn what_does_not_fit_is_refused_by_name() {
     let present = Present::new(&gpu, Format::Rgba8Unorm).unwrap();
     for (format, layers) in [(Format::Rgba8Unorm, 2), (COLOUR, 3)] {
         let [colour, depth] = attachments(&gpu, format, layers);
-        let error = present.record(&mut rec, &picture, &colour, &depth).unwrap_err().to_string();
+        let error = present.record(&mut rec, &picture, SIZE, &colour, &depth).unwrap_err().to_string();
         assert!(error.contains("present"), "{error}");
     }
     drop((rec, renderer, picture, present));

@@ -6,6 +6,7 @@ use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
+use cao::draw::band::Band;
 use cao::draw::bounds::Bounds;
 use cao::draw::brick_distance::BrickDistance;
 use cao::draw::eyes::FrameBuffer;
@@ -23,6 +24,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::samples::Filter;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -531,7 +533,8 @@ impl Stages {
             rec.discard(depth);
             self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
-            self.raycast.record(rec, bindings, &picture).unwrap();
+            let band = Band::whole(SIZE);
+            self.raycast.record(rec, bindings, &picture, band, 0..band.tiles()).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
             for (n, back) in backs.iter().enumerate() {
                 let image = if n < 2 { colour } else { depth };
@@ -803,5 +806,26 @@ fn pictures_do_not_depend_on_the_type_that_values_are_stored_in() {
             }
         }
     }
+    close(gpu);
+}
+
+/// Several samples a pixel: the twin takes the mean of whole pictures.
+#[test]
+fn samples_are_those_of_the_twin() {
+    let gpu = open();
+    let volume = in_floats(&builtin_box("engine", [20, 22, 18], [1.0, 1.1, 0.9]).unwrap());
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup(MAPS), COLOUR).unwrap();
+    let clips = [Clip::remove(Shape::Plane)];
+    renderer.set_clips(&clips).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let views = framing(&volume, 50.0, 30.0);
+    for (samples, filter) in [(3, Filter::Box), (4, Filter::Gaussian)] {
+        let look = Look { step_mm: Some(0.4), samples, filter, ..Look::default() };
+        let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
+        let expected = twin(&renderer, &volume, &transfer, &clips, &views, &look);
+        compare(&found, &expected, &views, 0.4, 10.0, &format!("{samples} {filter:?}"));
+    }
+    drop(renderer);
     close(gpu);
 }

@@ -592,3 +592,41 @@ fn verify_reports_every_method_that_it_was_asked_for() {
     wanted.sort();
     assert_eq!(usual, wanted);
 }
+
+/// Most that a picture of 4096 x 4096 pixels an eye may take more than one of 64 x 64, bytes: a band's images and what reads them back,
+/// which a software driver has in the processor's memory, its floats (32 MiB each) and its bytes, and room for allocators. In one piece
+/// it took 2 GiB.
+const BAND_BYTES: u64 = 160 << 20;
+
+/// Most memory that the program ever had, bytes, as the system tells while it runs.
+#[cfg(target_os = "linux")]
+fn peak(folder: &Folder, line: &str) -> u64 {
+    let arguments: Vec<_> = line.split_whitespace().collect();
+    let mut program = folder.command(&arguments).stdout(std::process::Stdio::null()).spawn().unwrap();
+    let mut most = 0;
+    while program.try_wait().unwrap().is_none() {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", program.id())).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kib = line.and_then(|line| line.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+        most = most.max(kib.unwrap_or(0) * 1024);
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(program.wait().unwrap().success(), "{line}");
+    most
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_large_picture_takes_no_more_memory_than_a_band() {
+    let folder = Folder::with_device();
+    let [small, large] = ["64x64", "4096x4096"].map(|size| {
+        peak(
+            &folder,
+            &format!("render builtin:empty:16 --radius-mm 2 --size {size} -o s.png --eyes l.png,r.png"),
+        )
+    });
+    assert!(small > 0 && large < small + BAND_BYTES, "{small} and {large} bytes");
+    let both = picture(&folder, "s.png");
+    let eye = picture(&folder, "l.png");
+    assert_eq!((both.dimensions(), eye.dimensions()), ((8192, 4096), (4096, 4096)));
+}

@@ -203,6 +203,20 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
     }
 }
 
+/// A budget that nothing meets: half of the pixels along each axis and samples a voxel apart, once a time is known.
+#[test]
+fn a_budget_for_drawing_chooses_scale_and_step() {
+    let run = bench().run(&format!("{TINY} --methods solid --draw-budget-ms 0.000001"));
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    let row = run.out.lines().skip_while(|line| !line.starts_with("drawing, ms")).nth(1).unwrap();
+    assert!(row.starts_with("solid") && row.contains("0.50 (0.50 ... 0.50)"), "{row}");
+    assert!(row.contains("1.00 (1.00 ... 1.00)"), "{row}");
+    let whole = bench().json(&format!("{TINY} --methods solid"));
+    let method = &whole["methods"][0];
+    assert_eq!((number(&method["drawn_scale"]), number(&method["drawn_step_mm"])), (1.0, 0.25), "{whole}");
+    assert_eq!(bench().run("--draw-budget-ms 0").code, Some(2));
+}
+
 #[test]
 fn series_vary_one_setting_at_a_time() {
     let folder = bench();

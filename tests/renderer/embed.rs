@@ -156,7 +156,10 @@ fn what_is_out_of_date_is_neither_drawn_nor_read() {
             rec.discard(&depth);
             let said = |result: cao::Result<()>| result.err().map(|error| error.to_string());
             let uses = vec![
-                ("record_draw", said(r.record_draw(&mut rec, &views, &look, &colour, &depth, [8, 8]))),
+                (
+                    "record_draw",
+                    said(r.record_draw(&mut rec, &views, &look, &colour, &depth, [8, 8]).map(drop)),
+                ),
                 ("draw", said(r.draw(&views, &look, [8, 8]).map(drop))),
                 ("verify", said(cao::verify::verify(r, &mut |_| ()).map(drop))),
                 ("seen_by_both", said(cao::verify::seen_by_both(r, &views, &look, &[Vec3::ZERO]).map(drop))),

@@ -40,7 +40,7 @@ impl Window {
         rec.discard(&self.colour);
         rec.discard(&self.depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(rec, &self.views, &self.look, &self.colour, &self.depth, SIZE)
+        renderer.record_draw(rec, &self.views, &self.look, &self.colour, &self.depth, SIZE).map(drop)
     }
 
     fn read_later(&self, rec: &mut Recorder) {

@@ -1,6 +1,7 @@
 //! The renderer as a whole, and what is measured of it: exact updates, both eyes, hosts, failures, leaks, budgets.
 
 mod adopt;
+mod bands;
 mod calls;
 mod consistency;
 mod contextual;
@@ -17,5 +18,6 @@ mod limits;
 mod methods;
 mod planner;
 mod real_data;
+mod samples;
 mod scenes;
 mod stability;

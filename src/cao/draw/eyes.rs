@@ -4,12 +4,14 @@ use crate::Result;
 use crate::field::Field;
 use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
-use cao_kernels::shared::eyes::{Eye, Frame, MOST_VIEWS};
+use cao_kernels::shared::eyes::{self, Eye, Frame, MOST_VIEWS};
 use cao_model::look::{Look, Occluded};
+use cao_model::samples::MOST_SAMPLES;
 use cao_model::view::View;
 use glam::{Vec2, Vec3};
 
 const _: () = assert!(MOST_VIEWS as usize == View::MAX);
+const _: () = assert!(eyes::MOST_SAMPLES == MOST_SAMPLES && 2 * eyes::PAIRS_OF_SAMPLES == MOST_SAMPLES);
 
 /// Most samples on a ray. A frame of more is no better and keeps a device busy for so long that its driver gives up.
 const MAX_SAMPLES: f32 = 1e5;
@@ -101,6 +103,9 @@ impl FrameBuffer {
         data.remainder = look.remainder();
         data.bias = field.bias;
         data.scale = field.scale;
+        (data.samples, data.share) = (look.samples, 1.0 / look.samples as f32);
+        let places = data.places.as_flattened_mut().chunks_exact_mut(2);
+        places.zip(look.offsets()).for_each(|(place, at)| place.copy_from_slice(&at.to_array()));
         rec.barrier(&[Access::UniformRead, Access::GraphicsRead], &[Access::TransferWrite]);
         rec.update(&self.buffer, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::UniformRead, Access::GraphicsRead]);

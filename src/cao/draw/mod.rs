@@ -1,7 +1,9 @@
-//! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, attachments of hosts.
+//! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, bands of it, what a frame affords, attachments of hosts.
 
+pub mod band;
 pub mod bounds;
 pub mod brick_distance;
+pub mod budget;
 pub mod extent;
 pub mod eyes;
 pub mod filter;

@@ -1,6 +1,7 @@
 //! A picture into a host's attachments: whatever colour format they have, and depth `D32Float`.
 //!
-//! In: a [`Picture`]. Out: the layers of two attachments, one a view, in one multiview pass. Cost: a read and a write a pixel.
+//! In: a [`Picture`], or its upper left. Out: the layers of two attachments, one a view, in one multiview pass. Cost: a read and a write a
+//! pixel; five reads where it is enlarged, colours interpolated and depths taken from the nearest pixel.
 
 use crate::Result;
 use crate::draw::eyes::check_count;
@@ -50,12 +51,19 @@ impl Present {
         Ok(slot.get_or_init(|| pipeline))
     }
 
-    /// Draws all views of a picture over the upper left of as many layers. A number other than two builds its pipeline when it first
-    /// comes.
+    /// Draws all views of a picture, of which the upper left was drawn to, `drawn` pixels, over as many pixels as the picture has in the
+    /// upper left of as many layers. A number of views other than two builds its pipeline when it first comes.
     ///
     /// # Errors
     /// Attachments of another format, of fewer layers or pixels.
-    pub fn record(&self, rec: &mut Recorder, picture: &Picture, colour: &Image, depth: &Image) -> Result<()> {
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        picture: &Picture,
+        drawn: [u32; 2],
+        colour: &Image,
+        depth: &Image,
+    ) -> Result<()> {
         let binds = kernel::DrawBindings { colours: &picture.colour, depths: &picture.depth };
         let attachments = Attachments {
             colours: &[(colour, Some([0.0; 4]))],
@@ -63,6 +71,8 @@ impl Present {
             layer: None,
             size: picture.size(),
         };
-        Ok(rec.draw(self.pipeline(picture.views())?, &binds, &[], attachments, kernel::CORNERS)?)
+        let params = kernel::PresentParams { drawn, size: picture.size() };
+        let push = bytemuck::bytes_of(&params);
+        Ok(rec.draw(self.pipeline(picture.views())?, &binds, push, attachments, kernel::CORNERS)?)
     }
 }

@@ -1,35 +1,71 @@
-//! Drawing: into a picture, into a host's attachments, and read back.
+//! What draws, recorded: into a picture, or into a host's attachments.
 
 use super::Renderer;
+use crate::draw::band::Band;
+use crate::draw::budget::{Drawn, Quality};
 use crate::draw::picture::Picture;
 use crate::draw::raycast::Bindings;
 use crate::stages;
 use crate::{Error, Result};
-use cao_gpu::{Access, Buffer, BufferUse, Image, Recorder, Timings};
+use cao_gpu::{Access, Image, Recorder};
 use cao_model::look::Look;
 use cao_model::view::View;
+use std::ops::Range;
 use std::sync::PoisonError;
-
-/// The images of all views, left and right first, read back from the device.
-#[derive(Clone, Debug)]
-pub struct StereoImage<const VIEWS: usize = 2> {
-    /// Width and height of one view in pixels.
-    pub size: [u32; 2],
-    /// Of each view: premultiplied linear RGBA, rows from the top.
-    pub colour: [Vec<[f32; 4]>; VIEWS],
-    /// Of each view: Vulkan depth, 1 where nothing is drawn.
-    pub depth: [Vec<f32>; VIEWS],
-}
 
 impl Renderer {
     /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
     /// can read it afterwards. Refuses while the ambient volume is out of date.
+    ///
+    /// Returns what is drawn: with [`Look::budget_ms`] that may be a part of the picture, its upper left, and samples may lie farther apart;
+    /// else it is all of it. [`Self::drew`] takes it with the time that it took.
     pub fn record_picture(
         &self,
         rec: &mut Recorder,
         views: &[View],
         look: &Look,
         picture: &Picture,
+    ) -> Result<Drawn> {
+        self.current()?;
+        look.check()?;
+        let drawn = self.affordable(look, picture.size());
+        let look = Look { step_mm: Some(drawn.step_mm), ..*look };
+        let band = Band::whole(drawn.size);
+        self.record_tiles(rec, views, &look, picture, band, 0..band.tiles())?;
+        Ok(drawn)
+    }
+
+    /// What the look's budget allows of a picture of this size.
+    fn affordable(&self, look: &Look, size: [u32; 2]) -> Drawn {
+        let voxel = self.subject.field.min_spacing();
+        let step = look.step(voxel);
+        let quality = look.budget_ms.map_or(Quality::FULL, |ms| {
+            let mut controller = self.controller.lock().unwrap_or_else(PoisonError::into_inner);
+            // Samples at most a voxel apart: beyond, thin things are missed.
+            controller.choose(f64::from(ms), voxel / step)
+        });
+        let part = |pixels: u32| (pixels as f32 * quality.scale).ceil().max(1.0) as u32;
+        // A float holds no larger number of pixels exactly; all of them are all of them.
+        let size = if quality.scale == 1.0 { size } else { size.map(part) };
+        Drawn { size, step_mm: step * quality.coarser, quality }
+    }
+
+    /// Says how long a drawing took that [`Self::record_picture`] or [`Self::record_draw`] recorded, in ms: for looks with a budget, whose
+    /// later drawings are chosen by it. Times may come late and need not come for every frame. They are
+    /// [`Recorded::timings`](cao_gpu::Recorded::timings)`.of(Phase::Draw)`, or what the host measured itself.
+    pub fn drew(&self, drawn: &Drawn, ms: f64) {
+        self.controller.lock().unwrap_or_else(PoisonError::into_inner).learn(&drawn.quality, ms);
+    }
+
+    /// Records these tiles of a band, after the eyes and what else a band begins with where they are its first.
+    pub(super) fn record_tiles(
+        &self,
+        rec: &mut Recorder,
+        views: &[View],
+        look: &Look,
+        picture: &Picture,
+        band: Band,
+        tiles: Range<u32>,
     ) -> Result<()> {
         self.current()?;
         if picture.views() != views.len() {
@@ -37,14 +73,18 @@ impl Renderer {
             return Err(Error::refused("picture", problem));
         }
         let (subject, fields) = (&self.subject, self.ambient.fields());
-        self.frame.record(rec, &subject.field, views, look, subject.reference_mm())?;
+        if tiles.start == 0 {
+            self.frame.record(rec, &subject.field, views, look, subject.reference_mm())?;
+        }
         rec.barrier(
             &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead, Access::StorageWrite],
             &[Access::StorageWrite],
         );
-        rec.discard(&picture.colour);
-        rec.discard(&picture.depth);
-        rec.barrier(&[], &[Access::StorageWrite]);
+        if tiles.start == 0 {
+            rec.discard(&picture.colour);
+            rec.discard(&picture.depth);
+            rec.barrier(&[], &[Access::StorageWrite]);
+        }
         rec.stage(stages::RAYCAST)?;
         let bindings = Bindings {
             field: &subject.field,
@@ -55,7 +95,7 @@ impl Renderer {
             clips: &subject.clip_set,
             frame: &self.frame,
         };
-        self.raycast.record(rec, bindings, picture)?;
+        self.raycast.record(rec, bindings, picture, band, tiles)?;
         rec.end_stage()?;
         rec.barrier(
             &[Access::StorageWrite],
@@ -65,7 +105,8 @@ impl Renderer {
     }
 
     /// Records the same into as many layers of attachments: `colour` of the renderer's format, `depth` of `D32Float`. The picture between
-    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then.
+    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then. Where a look's budget allows
+    /// less than all pixels, the attachments are filled all the same, colours interpolated, depths those of the nearest pixel.
     pub fn record_draw(
         &self,
         rec: &mut Recorder,
@@ -74,7 +115,7 @@ impl Renderer {
         colour: &Image,
         depth: &Image,
         size: [u32; 2],
-    ) -> Result<()> {
+    ) -> Result<Drawn> {
         self.current()?;
         let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
@@ -83,53 +124,10 @@ impl Renderer {
             None => Picture::new(&self.subject.gpu, size, views.len())?,
         };
         let picture = presented.insert(picture);
-        self.record_picture(rec, views, look, picture)?;
+        let drawn = self.record_picture(rec, views, look, picture)?;
         rec.stage(stages::PRESENT)?;
-        self.present.record(rec, picture, colour, depth)?;
+        self.present.record(rec, picture, drawn.size, colour, depth)?;
         rec.end_stage()?;
-        Ok(())
-    }
-
-    /// Draws both eyes, or any one to four views ([`View::MAX`]), on the device's own queue and reads them back. Refuses while the ambient
-    /// volume is out of date.
-    pub fn draw<const VIEWS: usize>(
-        &self,
-        views: &[View; VIEWS],
-        look: &Look,
-        size: [u32; 2],
-    ) -> Result<(StereoImage<VIEWS>, Timings)> {
-        self.current()?;
-        if size.contains(&0) {
-            let problem = format!("{} x {}; expected at least 1 x 1 pixels", size[0], size[1]);
-            return Err(Error::refused("image size", problem));
-        }
-        let gpu = &self.subject.gpu;
-        let picture = Picture::new(gpu, size, VIEWS)?;
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let read_back = |bytes| gpu.buffer("image read-back", bytes, BufferUse::Readback);
-        let colours = (0..VIEWS).map(|_| read_back(16 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
-        let depths = (0..VIEWS).map(|_| read_back(4 * pixels)).collect::<cao_gpu::Result<Vec<_>>>()?;
-
-        let mut rec = gpu.recorder("draw")?;
-        self.record_picture(&mut rec, views, look, &picture)?;
-        for eye in 0..VIEWS {
-            let extent = [size[0], size[1], 1];
-            rec.copy_image_to_buffer(&picture.colour, eye as u32, [0; 3], extent, &colours[eye], 0)?;
-            rec.copy_image_to_buffer(&picture.depth, eye as u32, [0; 3], extent, &depths[eye], 0)?;
-        }
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-        let timings = rec.submit_and_wait()?;
-
-        let mut image = StereoImage {
-            size,
-            colour: std::array::from_fn(|_| Vec::new()),
-            depth: std::array::from_fn(|_| Vec::new()),
-        };
-        for view in 0..VIEWS {
-            let read = |buffer: &Buffer| buffer.read(0, buffer.bytes());
-            image.colour[view] = bytemuck::pod_collect_to_vec(&read(&colours[view])?);
-            image.depth[view] = bytemuck::pod_collect_to_vec(&read(&depths[view])?);
-        }
-        Ok((image, timings))
+        Ok(drawn)
     }
 }

@@ -12,6 +12,7 @@ use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
+use cao_model::samples::{Filter, MOST_SAMPLES};
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
 use glam::Vec3;
 use std::ffi::OsString;
@@ -180,6 +181,13 @@ pub struct Render {
     /// Pixels of one eye [default: 1024x1024]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
+    /// Rays of a pixel, whose mean is shown: smooth edges for N times the time [default: the scene's, 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SAMPLES)))]
+    pub samples: Option<u32>,
+    /// How they are spread. box: over the pixel; gaussian: as a bell with sigma half a pixel, smoother and softer [default: the scene's,
+    /// box]
+    #[arg(long, value_name = "box|gaussian", value_parser = |s: &str| Filter::parse(s))]
+    pub filter: Option<Filter>,
     /// Axes of clips, eyes and light. patient: right, anterior, superior where the file states them, else the index axes; index:
     /// the index axes as stored [default: the scene's, patient]
     #[arg(long, value_name = "patient|index", value_parser = |s: &str| Frame::parse(s))]

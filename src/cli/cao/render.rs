@@ -3,11 +3,11 @@
 use crate::args::{self, Global, Render, usage};
 use crate::budget;
 use anyhow::Result;
-use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao::renderer::{Bands, COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_formats::scene::{Scene, Stereo, Viewpoint};
-use cao_formats::{Outputs, Picture};
+use cao_formats::{GrowingPng, Outputs, Picture};
 use cao_model::error::shown_path;
 use cao_model::fit::{Fit, Fitting};
 use cao_model::frame::Turn;
@@ -15,7 +15,7 @@ use cao_model::methods::Method;
 use cao_model::view::StereoRig;
 use clap::ArgMatches;
 use glam::Vec3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitCode> {
@@ -65,6 +65,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
+    let bands = Bands::new(&gpu, size, 2)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&turn.clips(&scene.clips))?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
@@ -74,12 +75,17 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let fitting = scene.stereo.fitting(aspect);
     let rig = fitting.map_or(Ok(None), |fitting| fitted(&renderer, &fitting, turn))?.unwrap_or(unfitted);
     let views = views(&rig)?;
-    let (image, draw) = renderer.draw(&views, &look, size)?;
-    timings.extend(draw);
-    check_validation(&gpu)?;
-
-    progress.stage("writing");
-    targets.write(|files| write(files, args, &image, scene.image.background))?;
+    targets.write(|files| {
+        let mut pictures = Pictures::begin(files, args, size, scene.image.background)?;
+        timings.extend(renderer.draw_bands(&views, &look, bands, &mut |first, band| {
+            files.go_on()?;
+            pictures.add(band)?;
+            progress.set(f64::from(first + band.size[1]) / f64::from(size[1]));
+            anyhow::Ok(())
+        })?);
+        check_validation(&gpu)?;
+        pictures.finish(files)
+    })?;
     drop(progress);
     let mut out = Out::new(global);
     out.device(&gpu);
@@ -159,18 +165,45 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     scene.stereo.ipd_mm = args.ipd.or(scene.stereo.ipd_mm);
     scene.look.shading = args.shading.unwrap_or(scene.look.shading);
     scene.look.light_from = args.light_from.unwrap_or(scene.look.light_from);
+    scene.look.samples = args.samples.unwrap_or(scene.look.samples);
+    scene.look.filter = args.filter.unwrap_or(scene.look.filter);
     Ok(())
 }
 
-fn write(files: &mut Outputs, args: &Render, image: &StereoImage, background: [f32; 3]) -> Result<()> {
-    let [width, height] = image.size;
-    let [left, right] = image.colour.each_ref().map(|eye| Picture::over(width, height, eye, background));
-    let mut put = |path: &Path, picture: &Picture| -> Result<()> {
-        let png = picture.png()?;
-        Ok(files.write(path, |file| file.write_all(&png))?)
-    };
-    if let Some(path) = &args.output {
-        put(path, &Picture::beside(&left, &right))?;
+/// The files, which grow from band to band.
+struct Pictures {
+    background: [f32; 3],
+    /// Left and right, side by side.
+    both: Option<GrowingPng>,
+    /// Left, right.
+    eyes: Vec<GrowingPng>,
+}
+
+impl Pictures {
+    fn begin(
+        files: &Outputs,
+        args: &Render,
+        [width, height]: [u32; 2],
+        background: [f32; 3],
+    ) -> Result<Self> {
+        let begin = |path: &PathBuf, width| Ok(GrowingPng::new(files.open(path)?, width, height)?);
+        Ok(Self {
+            background,
+            both: args.output.as_ref().map(|path| begin(path, 2 * width)).transpose()?,
+            eyes: args.eyes.iter().map(|path| begin(path, width)).collect::<Result<_>>()?,
+        })
     }
-    args.eyes.iter().zip([&left, &right]).try_for_each(|(path, eye)| put(path, eye))
+
+    fn add(&mut self, band: &StereoImage) -> Result<()> {
+        let [width, rows] = band.size;
+        let eyes = band.colour.each_ref().map(|eye| Picture::over(width, rows, eye, self.background));
+        if let Some(both) = &mut self.both {
+            both.add(&Picture::beside(&eyes[0], &eyes[1]).pixels)?;
+        }
+        self.eyes.iter_mut().zip(&eyes).try_for_each(|(png, eye)| Ok(png.add(&eye.pixels)?))
+    }
+
+    fn finish(self, files: &mut Outputs) -> Result<()> {
+        self.both.into_iter().chain(self.eyes).try_for_each(|png| Ok(files.keep(png.finish()?)?))
+    }
 }

@@ -27,6 +27,10 @@ pub struct Cli {
     /// Views drawn at once: 1, 2 (left and right), 4 (and an inset for each)
     #[arg(long, value_name = "N", value_parser = views, default_value = "2")]
     pub views: usize,
+    /// What the drawing of a frame is to take: resolution and distance of samples follow from the times of former frames, down to half of
+    /// the pixels along each axis and samples a voxel apart
+    #[arg(long, value_name = "T", value_parser = milliseconds)]
+    pub draw_budget_ms: Option<f32>,
     /// Frames of one run that count; the path closes after 90 [default: 90, on a software driver 10]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: Option<u32>,
@@ -91,6 +95,11 @@ stages are those of the paper's Fig. 9: clipping (its step 4), spherical ray
 cast (step 5), rendering (step 6), overhead (the rest of the frame's time).
 
 Exit codes: 0 done, 1 failed, 2 wrong usage.";
+
+fn milliseconds(text: &str) -> Result<f32, String> {
+    let ms = text.parse().ok().filter(|ms: &f32| ms.is_finite() && *ms > 0.0);
+    ms.ok_or_else(|| "expected a number > 0".into())
+}
 
 fn views(text: &str) -> Result<usize, String> {
     match text {

@@ -5,10 +5,11 @@ use super::way::Way;
 use anyhow::{Context, Result};
 use cao::ambient::Categories;
 use cao::draw::picture::Picture;
-use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::{Counts, Gpu, Timings};
+use cao::renderer::{COLOUR, Drawn, Renderer};
+use cao_gpu::{Counts, Gpu, Phase, Timings};
 use cao_measure::split::Split;
 use cao_model::clip::Shape;
+use cao_model::look::Look;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -42,6 +43,8 @@ pub struct Plan {
     pub frames: u32,
     pub runs: u32,
     pub warm_up: u32,
+    /// What the drawing of a frame is to take, ms.
+    pub draw_budget_ms: Option<f32>,
 }
 
 impl Plan {
@@ -63,6 +66,8 @@ pub struct Frame {
     pub recording: f64,
     /// What the update asks of Vulkan.
     pub asked: Counts,
+    /// What was drawn; less than all of the picture where there is a budget.
+    pub drawn: Drawn,
 }
 
 /// The parts of a frame as the paper names them (CAO Fig. 9), and what no stage accounts for.
@@ -166,7 +171,7 @@ impl<'a> Runner<'a> {
         let Configuration { input, size, views, .. } = self.configuration;
         let aspect = size[0] as f32 / size[1] as f32;
         let views = path::views(input.volume.size_mm(), aspect, *views, frame)?;
-        let look = self.measured.method.look();
+        let look = Look { budget_ms: plan.draw_budget_ms, ..self.measured.method.look() };
 
         let start = Instant::now();
         self.move_clip(plan, frame)?;
@@ -174,17 +179,20 @@ impl<'a> Runner<'a> {
         let before = Instant::now();
         self.renderer.record_update(&mut rec)?;
         let (recording, asked) = (before.elapsed().as_secs_f64() * 1e3, rec.counts());
-        self.renderer.record_picture(&mut rec, &views, &look, &self.target)?;
+        let drawn = self.renderer.record_picture(&mut rec, &views, &look, &self.target)?;
         let stages = rec.submit_and_wait()?;
         let wall = start.elapsed().as_secs_f64() * 1e3;
+        // Of a device without timestamps the whole frame is known.
+        self.renderer.drew(&drawn, if stages.is_empty() { wall } else { stages.of(Phase::Draw) });
 
-        Ok(Frame { wall, stages, categories: self.renderer.categories()?, recording, asked })
+        Ok(Frame { wall, stages, categories: self.renderer.categories()?, recording, asked, drawn })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use cao::renderer::Quality;
 
     #[test]
     fn what_no_stage_accounts_for_is_overhead() {
@@ -198,6 +206,7 @@ mod tests {
             categories: Categories::default(),
             recording: 0.0,
             asked: Counts::default(),
+            drawn: Drawn { size: [1, 1], step_mm: 1.0, quality: Quality::FULL },
         };
         assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
         // Clocks of device and host may disagree by a little; no time is negative.

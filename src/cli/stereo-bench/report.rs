@@ -111,6 +111,32 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
         line(format!("{:<12}{ms:>20.3}{commands:>20}{barriers:>20}{calls:>20}", m.method.name()));
     }
     line("            medians; one submission a frame, which the host makes".into());
+    if let Some(budget) = plan.draw_budget_ms {
+        line(String::new());
+        line(format!(
+            "{:<12}{:>10}{:>10}{:>10}{:>10}{:>10}{:>22}{:>22}",
+            "drawing, ms", "budget", "median", "95 %", "99 %", "expected", "scale", "step, mm"
+        ));
+        for m in all {
+            let of = |of: fn(&Frame) -> f64| m.frames().map(of).collect::<Vec<_>>();
+            let times = of(|frame| frame.parts()[2]);
+            let [p50, p95, p99] = [50.0, 95.0, 99.0].map(|p| percentile(&times, p));
+            let foreseen = |f: &Frame| f.drawn.quality.expected_ms.map(f64::from);
+            let expected: Vec<f64> = m.frames().filter_map(foreseen).collect();
+            let expected = if expected.is_empty() { "-".into() } else { format!("{:.2}", median(&expected)) };
+            let range = |values: Vec<f64>| {
+                let [least, middle, most] = [0.0, 50.0, 100.0].map(|p| percentile(&values, p));
+                format!("{middle:.2} ({least:.2} ... {most:.2})")
+            };
+            let scale = range(of(|frame| f64::from(frame.drawn.quality.scale)));
+            let step = range(of(|frame| f64::from(frame.drawn.step_mm)));
+            line(format!(
+                "{:<12}{budget:>10.2}{p50:>10.2}{p95:>10.2}{p99:>10.2}{expected:>10}{scale:>22}{step:>22}",
+                m.method.name()
+            ));
+        }
+        line("            what --draw-budget-ms chose: share of the pixels along each axis, distance of samples; medians, least, most".into());
+    }
     if all.iter().any(|m| m.frames().any(|frame| frame.stages.is_empty())) {
         line("            this device has no timestamps: all of a frame is overhead".into());
     }
@@ -218,6 +244,8 @@ fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
         "recording_ms": median(&m.frames().map(|frame| frame.recording).collect::<Vec<_>>()),
         "commands": median(&m.frames().map(|frame| frame.asked.commands as f64).collect::<Vec<_>>()),
         "calls": median(&m.frames().map(|frame| frame.asked.calls as f64).collect::<Vec<_>>()),
+        "drawn_scale": median(&m.frames().map(|frame| frame.drawn.quality.scale.into()).collect::<Vec<_>>()),
+        "drawn_step_mm": median(&m.frames().map(|frame| frame.drawn.step_mm.into()).collect::<Vec<_>>()),
         "parts_ms": parts,
         "stages_ms": stages(m),
     })

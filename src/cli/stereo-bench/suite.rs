@@ -157,7 +157,8 @@ fn plan(cli: &Cli) -> Result<Plan> {
         false => Some(shape(&cli.clip).with_context(|| format!("--clip {}", shown_path(&cli.clip)))?),
     };
     let methods = cli.methods.clone();
-    Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up })
+    let draw_budget_ms = cli.draw_budget_ms;
+    Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up, draw_budget_ms })
 }
 
 fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {

@@ -61,16 +61,32 @@ pub struct Image {
     pub depth: Vec<f32>,
 }
 
-/// Draws `size` = [width, height] pixels.
+/// Draws `size` = [width, height] pixels: the mean of the look's samples, each the picture of a field of view that is shifted by its
+/// place in the pixel, and the depth of the first.
 pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
     let ambient = |position| trilinear_clamped(&frame.grid, frame.ambient, position);
-    let (colour, depth) =
-        each(size[0] * size[1], |i| pixel(frame, view, size, i, &mut { ambient })).into_iter().unzip();
+    let views: Vec<View> = frame.look.offsets().into_iter().map(|at| shifted(view, size, at)).collect();
+    let mean = |i| {
+        let samples = views.iter().map(|view| pixel(frame, view, size, i, &mut { ambient }));
+        let samples: Vec<([f32; 4], f32)> = samples.collect();
+        let sum = |c: usize| samples.iter().map(|(colour, _)| f64::from(colour[c])).sum::<f64>();
+        (std::array::from_fn(|c| (sum(c) / samples.len() as f64) as f32), samples[0].1)
+    };
+    let (colour, depth) = each(size[0] * size[1], mean).into_iter().unzip();
     Image { colour, depth }
 }
 
+/// The view whose pixels' centres are at this place, in pixels, from those of `view`.
+pub fn shifted(view: &View, size: [usize; 2], place: Vec2) -> View {
+    let mut tan = view.tan;
+    let x = place.x / size[0] as f32 * (tan.right - tan.left);
+    let y = place.y / size[1] as f32 * (tan.down - tan.up);
+    (tan.left, tan.right, tan.up, tan.down) = (tan.left + x, tan.right + x, tan.up + y, tan.down + y);
+    View { tan, ..*view }
+}
+
 /// Index coordinates at which these pixels read the ambient factor, in the order of their rays; where a ray ends depends on what it has
-/// read, and these go as far as the darkest does.
+/// read, and these go as far as the darkest does. One sample a pixel.
 pub fn ambient_positions(
     frame: &Frame,
     view: &View,

@@ -3,7 +3,7 @@
 
 /// Bytes that this process can still get, as far as the system says so: memory and swap that are free or can be freed, within the limit
 /// of its container.
-pub(crate) fn available() -> Option<u64> {
+pub fn available() -> Option<u64> {
     let read = |path: &str| std::fs::read_to_string(path).ok();
     let free = of_meminfo(&read("/proc/meminfo")?)?;
     let limits = ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"];
