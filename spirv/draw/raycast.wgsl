@@ -60,7 +60,8 @@ const CUT_HALVINGS = 8u;
 // Parts that a step can be halved into.
 const PARTS = 16u;
 
-// Light is found for stretches of steps, which are as long as a voxel or stop this share of a pixel's light.
+// Light is found for stretches of so many steps, at most a voxel, or that stop this share of a pixel's light.
+const STEPS_LIT = 4.0;
 const MOST_LIT = 0.125;
 
 // A step is halved if it stops more than this share of a pixel's light, and this share more or less than it would if all of it were as one
@@ -249,8 +250,8 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     let part = ray.step / f32(PARTS);
     // mm of way a mm of view depth
     let slant = frame.spacing.w / ray.step;
-    // view depth of a voxel's edge
-    let voxel = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z)) / slant;
+    // Parts of a stretch: whole steps, so that rounding does not decide.
+    let stretch = PARTS * u32(clamp(smallest_spacing() / frame.spacing.w + 0.01, 1.0, STEPS_LIT));
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
 
     var colour = vec3(0.0);
@@ -271,7 +272,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
     var over = false;
     // Of the stretch that is not lit yet: where it begins, what passes, the colours that it stops, and depth and value, each times the
     // share that is stopped there.
-    var t_first = 0.0;
+    var first = 0u;
     var open = 1.0;
     var tint = vec3(0.0);
     var centre = vec2(0.0);
@@ -281,7 +282,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
             let t = ray.begin + f32(n) * part;
             over = !(t < shown.y);
             let covered = (1.0 - alpha) * (1.0 - open);
-            let full = n % PARTS == 0u && (covered > MOST_LIT || t - t_first >= voxel);
+            let full = n % PARTS == 0u && (covered > MOST_LIT || n - first >= stretch);
             // What is left out of a stretch also moves the place where it is lit: by its share of a voxel, over which light changes by less
             // than all of it.
             if over || open < 1.0 && (full || ends(colour, 2.0 * (1.0 - alpha) * open)) {
@@ -350,7 +351,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
                         continue;
                     }
                     if open == 1.0 {
-                        t_first = t;
+                        first = n;
                     }
                     tint += open * found.colour;
                     centre += open * found.alpha * vec2(mix(t_from, t_to, found.centre), mix(near, far, found.centre));

@@ -1,12 +1,12 @@
 // Direction of steepest rise of the values: 3 x 3 x 3 places one voxel apart with weights near Scharr's, each interpolated linearly
-// (method.md section 9 has what other filters reach).
+// (method.md section 10 has what other filters reach).
 //
 //   g_x = D(x) S(y) S(z) and so on,   D = [-1 0 1],  S = [1 B 1] / (2 + B)
 //
 // Interpolation spreads a place over two texels, so that along each axis four take part. In: `volume`, `edge`. Cost: 24 filtered
 // reads, or 64 of texels where the filter is too coarse.
 
-// Scharr takes 3.3; this suits places that are interpolated (method.md section 9).
+// Scharr takes 3.3; this suits places that are interpolated (method.md section 10).
 const MIDDLE = 3.0;
 
 // In texels of the volume a voxel.

@@ -32,6 +32,9 @@ const CUT_ENDS = 0.75;
 const NO_SURFACE = 0.02;
 const SURFACE = 0.2;
 
+// Rise of the values from a voxel before to a voxel behind, of all their change on the way, from which on a gradient has a direction.
+const STRAIGHT = 0.2;
+
 // Mean of |n.l| over all directions: Lambert's term of what has none.
 const NO_DIRECTION = 0.5;
 
@@ -49,45 +52,36 @@ fn reflected(normal: vec3<f32>, front: f32, back: f32, towards_eye: vec3<f32>) -
     return vec2(arriving, select(0.0, arriving * pow(mirrored, frame.shininess), same_side));
 }
 
-// What light finds at a place.
-struct Surface {
-    // diffuse and specular part of what comes back
-    back: vec2<f32>,
-    // index coordinates from the place to where the ambient factor of its surface is
-    outside: vec3<f32>,
-}
-
-// The ambient factor of a surface is that of the air in front of it, half a voxel out of it: where half of the opacity is reached, its own
-// matter already takes a part that edges do not lose, and would shine against flat walls. Farther out no value is needed, so
-// that none is there (method.md section 9).
-const AIR = 0.5;
-
 // Inside the volume, by the gradient of the values. Opacity a voxel before and behind the place along the gradient says how much of a
 // surface there is, relative to the largest of the three, and which side is out: a ridge has two.
-fn surface_inside(at: Shown, towards_eye: vec3<f32>) -> Surface {
+fn reflected_inside(at: Shown, towards_eye: vec3<f32>) -> vec2<f32> {
     let gradient = texel_gradient(at.position) / frame.spacing.xyz;
     let rise = length(gradient);
-    let none = Surface(vec2(NO_DIRECTION, 0.0), vec3(0.0));
+    let none = vec2(NO_DIRECTION, 0.0);
     if !(rise > 0.0) {
         return none;
     }
     let normal = gradient / rise;
     let voxel = normal * smallest_spacing() / frame.spacing.xyz;
     let here = opacity_of(at.value);
-    let before = opacity_of(value_at(at.position - voxel));
-    let behind = opacity_of(value_at(at.position + voxel));
+    let low = value_at(at.position - voxel);
+    let high = value_at(at.position + voxel);
+    let before = opacity_of(low);
+    let behind = opacity_of(high);
     let change = abs(before - here) + abs(behind - here);
     if !(change > 0.0) {
         return none;
     }
     let largest = max(here, max(before, behind));
-    let share = smoothstep(NO_SURFACE, SURFACE, change / largest);
+    // On the crest of a ridge the gradient is what rounding makes of nothing.
+    let way = abs(low - at.value) + abs(high - at.value);
+    let straight = smoothstep(0.0, STRAIGHT, abs(high - low) / max(way, 1e-30));
+    let share = smoothstep(NO_SURFACE, SURFACE, change / largest) * straight;
     // -1 ... 1: out is against the gradient, both ways, along it.
     let out = (before - behind) / change;
     let lit_back = max(1.0 - max(out, 0.0), frame.two_sided);
     let lit_front = max(1.0 + min(out, 0.0), frame.two_sided);
-    let back = mix(none.back, reflected(normal, lit_front, lit_back, towards_eye), share);
-    return Surface(back, voxel * out * share * min(here / largest, AIR));
+    return mix(none, reflected(normal, lit_front, lit_back, towards_eye), share);
 }
 
 fn smallest_spacing() -> f32 {
@@ -95,7 +89,7 @@ fn smallest_spacing() -> f32 {
 }
 
 // At any place.
-fn surface_at(at: Shown, direction: vec3<f32>) -> Surface {
+fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
     let towards_eye = -normalize(direction);
     let along = direction / frame.spacing.xyz;
     // The face of the volume through which the ray came in, and the way since then.
@@ -107,7 +101,7 @@ fn surface_at(at: Shown, direction: vec3<f32>) -> Surface {
     let way = select(entered, at.beside, by_clip) / smallest_spacing();
     let cut = 1.0 - smoothstep(CUT_HOLDS, CUT_ENDS, way);
     if cut == 0.0 {
-        return surface_inside(at, towards_eye);
+        return reflected_inside(at, towards_eye);
     }
     var normal = vec3(0.0);
     if by_clip {
@@ -117,25 +111,23 @@ fn surface_at(at: Shown, direction: vec3<f32>) -> Surface {
         normal = normalize(-sign(direction) * vec3<f32>(since <= vec3(first)));
     }
     let back = reflected(normal, 1.0, frame.two_sided, towards_eye);
-    let outside = AIR * normal * smallest_spacing() / frame.spacing.xyz;
     if cut == 1.0 {
-        return Surface(back, outside);
+        return back;
     }
-    let inside = surface_inside(at, towards_eye);
-    return Surface(mix(inside.back, back, cut), mix(inside.outside, outside, cut));
+    return mix(reflected_inside(at, towards_eye), back, cut);
 }
 
 // Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
 fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
-    if frame.diffuse + frame.specular + frame.occluded == 0.0 {
-        return frame.ambient * at.colour;
+    var back = vec2(0.0);
+    if frame.diffuse + frame.specular > 0.0 {
+        back = reflected_at(at, direction);
     }
-    let surface = surface_at(at, direction);
     var open = 1.0;
     if frame.occluded > 0.0 {
-        open = min(frame.gain * ambient_at(at.position + surface.outside), 1.0);
+        open = min(frame.gain * ambient_at(at.position), 1.0);
     }
     let open_rest = mix(1.0, open, frame.occluded_rest);
-    let matt = open * frame.ambient + open_rest * frame.diffuse * surface.back.x;
-    return matt * at.colour + open_rest * frame.specular * surface.back.y;
+    let matt = open * frame.ambient + open_rest * frame.diffuse * back.x;
+    return matt * at.colour + open_rest * frame.specular * back.y;
 }

@@ -362,7 +362,7 @@ fn volumes_are_drawn_with_flags_alone_also_negative_ones_and_the_smallest() {
 #[test]
 fn what_is_visible_is_framed_and_the_box_for_whom_asks() {
     let folder = Folder::with_device();
-    let volume = "render builtin:fruit:32 --size 64x64 --solid";
+    let volume = "render builtin:fruit:32 --size 64x64 --shading phong";
     let rest = "--clip box --clip-mode keep --clip-scale 5 --clip-translate 8,0,0";
     // Columns of the left eye that show something.
     let width = |flags: &str| {
@@ -380,9 +380,9 @@ fn what_is_visible_is_framed_and_the_box_for_whom_asks() {
     assert!((12..=26).contains(&in_box), "{in_box}");
 
     folder.put("box.toml", "volume = \"builtin:fruit:32\"\n[stereo]\nfit = \"box\"");
-    folder.ok("render box.toml --size 64x64 --solid --eyes a.png,r.png");
+    folder.ok("render box.toml --size 64x64 --shading phong --eyes a.png,r.png");
     folder.ok(&format!("{volume} --fit box --eyes b.png,r.png"));
-    folder.ok("render box.toml --size 64x64 --solid --fit visible --eyes c.png,r.png");
+    folder.ok("render box.toml --size 64x64 --shading phong --fit visible --eyes c.png,r.png");
     folder.ok(&format!("{volume} --eyes d.png,r.png"));
     let [a, b, c, d] = ["a.png", "b.png", "c.png", "d.png"].map(|name| picture(&folder, name));
     assert!(a == b && c == d && a != c);

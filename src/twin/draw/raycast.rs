@@ -10,7 +10,7 @@
 //!
 //! where c_k is the segment's mean colour and p_k where its light comes from; the last L is the brightest light there is and E′ the slope
 //! of sRGB coding at the darkest component: what remains cannot change an 8-bit pixel by more than half a level. A segment that stops
-//! more light than its ends alone say is halved, up to four times; stretches of segments are lit together, up to a voxel long or until they stop an eighth of the light.
+//! more light than its ends alone say is halved, up to four times; stretches of segments are lit together, up to four steps and a voxel long or until they stop an eighth of the light.
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::segment::{segment, varies};
@@ -149,7 +149,9 @@ fn pixel(
     let (mut clip, mut cut_at) = (None, 0.0);
     // Of the stretch that is not lit yet: where it begins, what passes, and the colours that it stops, place and value times the share that
     // is stopped there.
-    let (mut first, mut open, mut lit) = (0.0, 1.0, (DVec3::ZERO, 0.0, 0.0));
+    let (mut first, mut open, mut lit) = (0, 1.0, (DVec3::ZERO, 0.0, 0.0));
+    let steps = (frame.grid.min_spacing() / frame.step_mm + 0.01).clamp(1.0, f64::from(kernel::STEPS_LIT));
+    let stretch = PARTS * steps as u64;
     // Parts of steps so far, and of the next one.
     let (mut n, mut size) = (0, PARTS);
     let place = |n: u64| begin + n as f64 * frame.step_mm / PARTS as f64;
@@ -160,7 +162,7 @@ fn pixel(
             let ends = |colour: DVec3, rest: f64| {
                 rest * brightest * srgb_slope(colour.min_element()) <= TOLERANCE / 255.0
             };
-            let full = n % PARTS == 0 && (covered > MOST_LIT || t - first >= frame.grid.min_spacing());
+            let full = n % PARTS == 0 && (covered > MOST_LIT || n - first >= stretch);
             // What is left out of a stretch also moves the place where it is lit.
             if t >= end || full || ends(colour, 2.0 * (1.0 - alpha) * open) {
                 // The stretch is lit where its light comes from.
@@ -210,7 +212,7 @@ fn pixel(
                 continue;
             }
             if open == 1.0 {
-                first = t;
+                first = n;
             }
             let share = open * found.alpha;
             lit.0 += open * found.colour;

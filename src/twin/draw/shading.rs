@@ -42,46 +42,27 @@ pub fn shaded(
 ) -> DVec3 {
     let look = &frame.look;
     let [k_a, k_d, k_s] = look.parts().map(f64::from);
-    let surface = surface_at(frame, at, direction.normalize(), light);
-    let open = if look.shading.occluded() {
-        let place = std::array::from_fn(|i| at.position[i] + surface.outside[i] / frame.grid.spacing[i]);
-        (f64::from(look.gain) * ambient(place)).min(1.0)
-    } else {
-        1.0
-    };
+    let open =
+        if look.shading.occluded() { (f64::from(look.gain) * ambient(at.position)).min(1.0) } else { 1.0 };
     let open_rest = if look.occluded == Occluded::All { open } else { 1.0 };
     let colour = at.colour;
-    let [diffuse, specular] = surface.back;
+    let [diffuse, specular] = reflected_at(frame, at, direction.normalize(), light);
     open * k_a * colour + open_rest * (k_d * diffuse * colour + DVec3::splat(k_s * specular))
 }
 
-/// What light finds at a place.
-struct Surface {
-    /// The diffuse and the specular part of what comes back.
-    back: [f64; 2],
-    /// Millimetres from the place to where the ambient factor of its surface is.
-    outside: DVec3,
-}
-
-impl Surface {
-    /// This one, and a share of the other instead.
-    fn mixed(&self, other: &Self, share: f64) -> Self {
-        let mix = |a: f64, b: f64| a + share * (b - a);
-        Self {
-            back: std::array::from_fn(|i| mix(self.back[i], other.back[i])),
-            outside: self.outside.lerp(other.outside, share),
-        }
-    }
+/// The first, and a share of the second instead.
+fn mix(a: [f64; 2], b: [f64; 2], share: f64) -> [f64; 2] {
+    std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
 }
 
 /// Inside, or just behind what cut.
-fn surface_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> Surface {
+fn reflected_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> [f64; 2] {
     let (entered, face) = entry(frame, at, direction);
     let by_clip = at.cut.filter(|_| at.beside <= entered);
     let voxel = frame.grid.min_spacing();
     let beside = by_clip.map_or(entered, |_| at.beside) / voxel;
     let cut = 1.0 - smoothstep(f64::from(kernel::CUT_HOLDS), f64::from(kernel::CUT_ENDS), beside);
-    let inside = surface_inside(frame, at, -direction, light);
+    let inside = reflected_inside(frame, at, -direction, light);
     if cut == 0.0 {
         return inside;
     }
@@ -89,11 +70,7 @@ fn surface_at(frame: &Frame, at: &Shown, direction: DVec3, light: DVec3) -> Surf
         clip_normal(&frame.clips[clip].clip, at.world - at.beside * direction, -direction)
     });
     let back = f64::from(u8::from(frame.look.two_sided));
-    let of_cut = Surface {
-        back: reflected(frame, normal, [1.0, back], -direction, light),
-        outside: f64::from(kernel::AIR) * voxel * normal,
-    };
-    inside.mixed(&of_cut, cut)
+    mix(inside, reflected(frame, normal, [1.0, back], -direction, light), cut)
 }
 
 /// Way in mm since a ray came into the volume, were it as large on, and the outer normal of the face.
@@ -112,30 +89,31 @@ fn entry(frame: &Frame, at: &Shown, direction: DVec3) -> (f64, DVec3) {
 }
 
 /// By the gradient of the values, and by the opacity a voxel before and behind the place along it.
-fn surface_inside(frame: &Frame, at: &Shown, towards_eye: DVec3, light: DVec3) -> Surface {
-    let none = Surface { back: [f64::from(kernel::NO_DIRECTION), 0.0], outside: DVec3::ZERO };
+fn reflected_inside(frame: &Frame, at: &Shown, towards_eye: DVec3, light: DVec3) -> [f64; 2] {
+    let none = [f64::from(kernel::NO_DIRECTION), 0.0];
     let Some(normal) = gradient(frame, at.position).try_normalize() else { return none };
     let voxel = frame.grid.min_spacing();
-    let opacity = |voxels: f64| {
+    let value = |voxels: f64| {
         let place = frame.grid.to_index((at.world + voxels * voxel * normal).to_array());
-        f64::from(frame.transfer.opacity_at(trilinear_clamped(&frame.grid, frame.values, place) as f32))
+        trilinear_clamped(&frame.grid, frame.values, place) as f32
     };
+    let (low, high) = (value(-1.0), value(1.0));
     let here = f64::from(frame.transfer.opacity_at(at.value));
-    let (before, behind) = (opacity(-1.0), opacity(1.0));
+    let [before, behind] = [low, high].map(|value| f64::from(frame.transfer.opacity_at(value)));
     let change = (before - here).abs() + (behind - here).abs();
     if change == 0.0 {
         return none;
     }
     let largest = here.max(before).max(behind);
-    let share = smoothstep(f64::from(kernel::NO_SURFACE), f64::from(kernel::SURFACE), change / largest);
+    let way = f64::from((low - at.value).abs() + (high - at.value).abs());
+    let straight =
+        smoothstep(0.0, f64::from(kernel::STRAIGHT), f64::from((high - low).abs()) / way.max(1e-30));
+    let share =
+        straight * smoothstep(f64::from(kernel::NO_SURFACE), f64::from(kernel::SURFACE), change / largest);
     let out = (before - behind) / change;
     let least = f64::from(u8::from(frame.look.two_sided));
     let sides = [(1.0 + out.min(0.0)).max(least), (1.0 - out.max(0.0)).max(least)];
-    let surface = Surface {
-        back: reflected(frame, normal, sides, towards_eye, light),
-        outside: voxel * out * (here / largest).min(f64::from(kernel::AIR)) * normal,
-    };
-    none.mixed(&surface, share)
+    mix(none, reflected(frame, normal, sides, towards_eye, light), share)
 }
 
 /// The diffuse and the specular part of what comes back from a surface, by the share of it that is turned to the front and to the back of its normal.
