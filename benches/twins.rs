@@ -36,7 +36,7 @@ fn twins(criterion: &mut Criterion) {
     let field = |clip: &Clip| ClipField::new(clip, &grid, reach, &MAPS).expect("maps");
     let mesh = clip(Shape::Mesh(Arc::new(TriangleMesh::sphere(2))));
     let clips = [field(&clip(Shape::Sphere)), field(&mesh)];
-    let (_, mask) = twin::clip::classify::classify(&grid, &opacity, &clips, 32);
+    let (clipped, mask) = twin::clip::classify::classify(&grid, &opacity, &clips, 32);
     let unclipped = twin::cast::lao::lao(&grid, &opacity, &occlusion, reference_mm);
     let ambient: Vec<f32> = unclipped.iter().map(|a| *a as f32).collect();
     let view = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 1.0, 1e3).expect("views")[0];
