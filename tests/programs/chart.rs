@@ -116,6 +116,7 @@ fn a_picture_with_a_fault_is_far_off_the_front() {
         assert!(off > most && off > 2.0 * default, "{off}, default {default}, others at most {most}");
         assert!(!looks::better(&marks, count, error).is_empty());
     }
+    drop(renderer);
     close(gpu);
 }
 
