@@ -74,7 +74,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     let total = (LIGHTS.len() * plan.separations_mm.len()) as f64;
     let (mut charts, mut compared) = (Vec::new(), usize::MAX);
     let (mut above, mut fails) = (Vec::new(), true);
-    let mut quoted = Vec::new();
+    let (mut quoted, mut percentiles) = (Vec::new(), Vec::new());
     for (light_from, from) in LIGHTS {
         let names = ["image space", "ours", "noise of sampling"];
         let mut curves = names.map(|_| [const { Vec::new() }; 2]);
@@ -117,13 +117,15 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             at(4),
             at(5)
         ));
-        charts.push(Chart {
-            title: format!("Colours of a surface that both eyes see, light from {from}"),
-            x: Quantity::linear("distance between the eyes, mm"),
-            y: Quantity::linear("|left − right|, linear light (0 … 1)"),
-            series,
-        });
+        let eyes = || Quantity::linear("distance between the eyes, mm");
+        let difference = || Quantity::linear("|left − right|, linear light (0 … 1)");
+        let title = format!("Colours of a surface that both eyes see, light from {from}");
+        // Means apart from percentiles, which are ten times as large.
+        let [means, high] = [0, 1].map(|part| series.iter().skip(part).step_by(2).cloned().collect());
+        charts.push(Chart { title: title.clone(), x: eyes(), y: difference(), series: means });
+        percentiles.push(Chart { title, x: eyes(), y: difference(), series: high });
     }
+    charts.append(&mut percentiles);
     let holds = above.is_empty() && compared > 0;
     let nearest = plan
         .separations_mm
