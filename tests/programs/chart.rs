@@ -1,12 +1,17 @@
 //! `cao chart`: every method after every kind of change, in numbers, drawings and a page that stands alone.
 
 use crate::support::Folder;
+use cao::renderer::{COLOUR, Renderer};
+use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, measure, report};
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, measure, report};
 use cao_measure::contender::{BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
+use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
+use cao_model::samples::Filter;
+use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_testing::{close, open};
@@ -25,7 +30,7 @@ fn scene(name: &str) -> Scene {
 
 fn plan() -> Plan {
     let reference = reference::Plan { directions: 200, steps_per_voxel: 4, max_voxels: 300 };
-    Plan { quick: true, runs: RUNS, size: [64, 48], reference }
+    Plan { quick: true, runs: RUNS, size: [64, 48], pictures: [48, 36], reference }
 }
 
 /// Measured once, for it takes seconds; what has to hold of it is in the functions that this calls.
@@ -44,6 +49,75 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     the_front_of_each_panel_is_beaten_by_nothing_and_beats_all_else(&chart);
     drawings_are_well_formed_and_show_every_method_and_change(&chart);
     the_report_stands_alone_and_has_every_part(&chart);
+    the_picture_is_drawn_in_every_way_and_more_work_errs_less(&chart);
+}
+
+fn the_picture_is_drawn_in_every_way_and_more_work_errs_less(chart: &Chart) {
+    let ways = looks::settings(1.0, true);
+    let records = records(&csv::pictures(chart));
+    assert_eq!(records.len(), chart.scenes.len() * ways.len() * RUNS as usize);
+    for record in &records {
+        let number = |name: &str| record[name].parse::<f64>().unwrap();
+        assert!(
+            number("raycast_ms") > 0.0 && number("flip") > 0.0 && number("rmse_levels") > 0.0,
+            "{record:?}"
+        );
+        assert_eq!(record["setting"] == ways[0].name(), record["ratio"] == "1", "{record:?}");
+    }
+    let scenes: Vec<_> = chart.scenes.iter().map(|scene| &scene.looks).collect();
+    let marks = looks::marks(&scenes, true);
+    let of = |samples: u32, step: f32| {
+        let same = |m: &&looks::Mark| {
+            let rays = m.setting.kind == looks::Kind::Rays && m.setting.look.filter == Filter::Box;
+            rays && m.setting.look.samples == samples && m.setting.step_voxels == step
+        };
+        marks.iter().find(same).unwrap().error
+    };
+    for (_, error) in ERRORS {
+        let least = marks.iter().map(|mark| error(&mark.error)).fold(f64::INFINITY, f64::min);
+        // Between the two finest steps the rays a pixel are what is left, and the order is a matter of luck.
+        assert!(error(&of(4, 0.125)) < 1.05 * least, "{} {least}", error(&of(4, 0.125)));
+        assert!(error(&of(1, 1.0)) > error(&of(1, 0.25)) && error(&of(1, 0.25)) > error(&of(4, 0.25)));
+        let half = marks.iter().find(|mark| mark.setting.kind == looks::Kind::Scale).unwrap();
+        assert!(error(&half.error) > error(&of(1, 0.25)));
+        assert!(scenes.iter().all(|scene| error(&scene.convergence) < error(&scene.drawn[0].error)));
+    }
+    let svg = looks_draw::draw(chart).svg();
+    well_formed(&svg).unwrap();
+    for text in ["default", "level 16", "half", "FLIP", "RMSE", "The default: by FLIP"] {
+        assert!(svg.contains(text), "{text}");
+    }
+}
+
+/// The reference is off by nothing; half of the light is farther off than any setting, and beaten by nearly all.
+#[test]
+fn a_picture_with_a_fault_is_far_off_the_front() {
+    let gpu = open();
+    let scene = scene("engine");
+    let setup = Setup::of(Method::default(), 1.0);
+    let mut renderer =
+        Renderer::new(&gpu, &scene.volume, scene.state.transfer.clone(), setup, COLOUR).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let views = scene.rig.views(1.0, 1.0, 500.0).unwrap();
+    let mut ways = looks::settings(1.0, true);
+    let count = ways.len();
+    let mut half = ways[0].clone();
+    (half.look.ambient, half.look.diffuse) = (0.5 * half.look.ambient, 0.5 * half.look.diffuse);
+    let truth = looks::Setting { look: looks::reference(1.0, 1), step_voxels: 1.0 / 16.0, ..ways[0].clone() };
+    ways.extend([half, truth]);
+    let found = looks::measure(&renderer, &views, [32, 32], 1.0, &ways, 2, &mut |_| ()).unwrap();
+    assert_eq!(found.drawn[count + 1].error, looks::Apart { flip: 0.0, levels: 0.0 });
+    let marks = looks::marks(&[&found], true);
+    for (_, error) in ERRORS {
+        assert!(!looks::front_of(&marks, error).contains(&count));
+        let most = marks[..count].iter().map(|mark| error(&mark.error)).fold(0.0, f64::max);
+        // The default's light is all that differs, and yet it is off by more than the coarsest setting there is.
+        let (off, default) = (error(&marks[count].error), error(&marks[0].error));
+        assert!(off > most && off > 2.0 * default, "{off}, default {default}, others at most {most}");
+        assert!(!looks::better(&marks, count, error).is_empty());
+    }
+    drop(renderer);
+    close(gpu);
 }
 
 /// Records of RFC 4180, by the names of the first.
@@ -255,7 +329,15 @@ fn the_report_stands_alone_and_has_every_part(chart: &Chart) {
     // Two pictures of each method.
     assert_eq!(with.matches("data:image/png;base64,").count(), 2 * METHODS.len());
     // As printed: a row of each of the paper's three tables.
-    for printed in ["Clustered histograms", "16.13", "272.846", "a machine", "cao chart -o &lt;x&gt;"] {
+    for printed in [
+        "(default)",
+        "Error of the picture",
+        "Clustered histograms",
+        "16.13",
+        "272.846",
+        "a machine",
+        "cao chart -o &lt;x&gt;",
+    ] {
         assert!(with.contains(printed), "{printed}");
     }
     assert!(with.contains("plain &amp; simple") && with.contains("a &lt;machine&gt;"));
@@ -295,17 +377,23 @@ fn the_program_writes_all_files_and_says_which() {
     let run = folder.under(script, "chart scene.toml --quick --runs 1 -o chart --json");
     assert_eq!(run.code, Some(0), "{}", run.err);
     let answer: serde_json::Value = serde_json::from_str(&run.out).unwrap();
-    assert_eq!(answer["files"].as_array().unwrap().len(), 4);
+    assert_eq!(answer["files"].as_array().unwrap().len(), 7);
     let mut names: Vec<_> = std::fs::read_dir(folder.path("chart"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.sort();
-    assert_eq!(names, ["chart.png", "chart.svg", "report.html", "runs.csv"]);
+    assert_eq!(
+        names,
+        ["chart.png", "chart.svg", "pictures.csv", "pictures.png", "pictures.svg", "report.html", "runs.csv"]
+    );
     let points = answer["points"].as_array().unwrap();
     for method in METHODS {
         assert!(points.iter().any(|p| p["method"] == method), "{method}");
     }
+    assert!(
+        answer["pictures"].as_array().unwrap().iter().any(|p| p["default"] == true && p["flip"].is_f64())
+    );
     let report = std::fs::read_to_string(folder.path("chart/report.html")).unwrap();
     // What the scene says, and not what is done where it says nothing.
     assert!(report.contains("scene.toml: 16 x 14 x 12 voxels, radius 3 mm, clip plane"));

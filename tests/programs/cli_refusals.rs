@@ -513,6 +513,6 @@ fn stability_asks_for_a_folder_and_for_trials_that_there_are() {
     let folder = Folder::without_device();
     folder.put("taken", "a file");
     refused(&folder, "stability", USAGE, &["--output"]);
-    refused(&folder, "stability -o out --only colour", USAGE, &["colour", "stereo, motion"]);
+    refused(&folder, "stability -o out --only colour", USAGE, &["colour", "stereo, pixels"]);
     refused(&folder, "stability -o taken", FAILURE, &["taken", "it is a file"]);
 }

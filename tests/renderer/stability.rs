@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, radius, sheets, stereo,
-    views,
+    Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, pixels, radius, sheets,
+    stereo, views,
 };
 use cao_testing::{close, open};
 
@@ -37,6 +37,21 @@ fn eyes_agree_in_data_space_and_not_in_image_space() {
     assert_eq!(curve(&finding, 0, "data space").largest(), 0.0);
     // Between the points of the grid some differ: the claim is about those on it.
     assert!(curve(&finding, 1, "data space (ours), any").largest() < 3.0);
+    close(gpu);
+}
+
+#[test]
+fn pictures_of_both_eyes_agree_where_both_see_a_surface_and_image_space_does_not() {
+    let gpu = open();
+    let plan = pixels::Plan { edge: 32, pixels: 96, separations_mm: vec![0.0, 20.0, 63.0] };
+    let finding = pixels::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    for light in 0..2 {
+        // Equal eyes have equal pictures, of either kind: what differs is not the comparison's.
+        for name in ["ours, mean", "image space, mean"] {
+            assert!(curve(&finding, light, name).at(0.0) < 1e-6, "{name}: {}", finding.sentence);
+        }
+    }
     close(gpu);
 }
 

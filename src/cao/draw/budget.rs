@@ -13,7 +13,7 @@
 /// Smallest scale: half of the pixels along each axis.
 pub const LEAST_SCALE: f32 = 0.5;
 /// The last level, which has both bounds.
-const LAST: u32 = 16;
+pub const LAST: u32 = 16;
 /// Share of the budget that a better picture may be expected to take: two levels are 19 % apart at most.
 const MARGIN: f64 = 0.85;
 /// Frames in a row for which a better picture must have been affordable, at first and at most.
@@ -34,8 +34,8 @@ impl Quality {
     /// As the look says.
     pub const FULL: Self = Self { scale: 1.0, coarser: 1.0, expected_ms: None };
 
-    /// At a level, where samples may be this many times as far apart.
-    fn at(level: u32, most: f32) -> Self {
+    /// At a level, 0 … [`LAST`], where samples may be this many times as far apart.
+    pub fn at(level: u32, most: f32) -> Self {
         let share = level as f32 / LAST as f32;
         Self { scale: LEAST_SCALE.powf(share), coarser: most.max(1.0).powf(share), expected_ms: None }
     }

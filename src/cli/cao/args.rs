@@ -102,14 +102,14 @@ Exit code 1 if any voxel or any point that both eyes see differs.";
 
 const CHART_EXAMPLES: &str = "\
 Examples:
-  cao chart -o chart                      three built-in scenes, some ten minutes
+  cao chart -o chart                      three built-in scenes, some fifteen minutes
                                           without a GPU
   cao chart --quick -o chart              a first look, two minutes
   cao chart head.nrrd --transfer ct-bone --radius-mm 20 -o chart
   cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
 
-Writes report.html, which stands alone, chart.svg, chart.png and runs.csv, every
-run of every method. A scene without clips gets a ball.";
+Writes report.html, which stands alone; chart.svg, chart.png and runs.csv, every
+run of every method; the same of the picture's own settings, pictures.*. A scene without clips gets a ball.";
 
 const STABILITY_EXAMPLES: &str = "\
 Examples:

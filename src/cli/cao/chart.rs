@@ -5,8 +5,10 @@ use anyhow::{Context, Result, bail};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_measure::chart;
+use cao_measure::chart::front::quartiles;
+use cao_measure::chart::looks::{self, ERRORS, Looks};
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, report};
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
 use cao_model::error::shown_path;
@@ -24,7 +26,8 @@ const QUICK: [&str; 3] = ["builtin:engine:32", "builtin:fruit:32", "builtin:skel
 const QUICK_RADIUS: f32 = 6.0;
 
 /// What is written.
-const FILES: [&str; 4] = ["runs.csv", "chart.svg", "chart.png", "report.html"];
+const FILES: [&str; 7] =
+    ["runs.csv", "chart.svg", "chart.png", "pictures.csv", "pictures.svg", "pictures.png", "report.html"];
 
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
@@ -50,10 +53,14 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let caption = chart.caption();
     let every: Vec<_> = chart.scenes.iter().collect();
     let drawing = draw::draw(&chart, &every, &caption);
+    let pictures = looks_draw::draw(&chart);
     let contents = [
         csv::runs(&chart).into_bytes(),
         drawing.svg().into_bytes(),
         drawing.png()?,
+        csv::pictures(&chart).into_bytes(),
+        pictures.svg().into_bytes(),
+        pictures.png()?,
         report::html(&chart, &machine(), &command(), peers.as_ref())?.into_bytes(),
     ];
     targets.write_all(&contents)?;
@@ -99,6 +106,7 @@ fn plan(args: &Args) -> Plan {
         quick: args.quick,
         runs: args.runs,
         size: if args.quick { [192, 192] } else { [384, 384] },
+        pictures: if args.quick { [64, 64] } else { [128, 128] },
         reference: if args.quick { quick } else { full },
     }
 }
@@ -159,6 +167,27 @@ fn summary(out: &mut Out, chart: &Chart) {
             ));
         }
     }
+    let looks: Vec<&Looks> = chart.scenes.iter().map(|scene| &scene.looks).collect();
+    let marks = looks::marks(&looks, ratios);
+    out.line(format!("picture: Pareto front by FLIP, ray cast in {unit}"));
+    for mark in looks::front_of(&marks, ERRORS[0].1).into_iter().map(|i| &marks[i]) {
+        let [low, time, high] = mark.time;
+        out.line(format!(
+            "  {:<27} {time:>9.4} {unit} ({low:.4} … {high:.4})   FLIP {:.4}, RMSE {:.2} levels{}",
+            mark.setting.name(),
+            mark.error.flip,
+            mark.error.levels,
+            if mark.setting.is_default() { ", the default" } else { "" }
+        ));
+    }
+    out.line(format!("  {}", chart.verdict()));
+    let pictures: Vec<_> = chart.scenes.iter().flat_map(|scene| scene.looks.drawn.iter().map(move |drawn| (scene, drawn)))
+        .map(|(scene, drawn)| json!({
+            "scene": scene.name, "setting": drawn.setting.name(), "default": drawn.setting.is_default(),
+            "ms": quartiles(drawn.runs.iter().map(|run| run[0])), "ratio": quartiles(drawn.runs.iter().map(|run| run[1])),
+            "flip": drawn.error.flip, "rmse_levels": drawn.error.levels
+        }))
+        .collect();
     let points = chart.scenes.iter().flat_map(|scene| scene.points.iter().map(move |point| (scene, point)));
     let points: Vec<_> = points
         .map(|(scene, point)| {
@@ -172,5 +201,7 @@ fn summary(out: &mut Out, chart: &Chart) {
             })
         })
         .collect();
-    out.json(json!({ "quoted_as": if ratios { "ratio" } else { "ms" }, "points": points }));
+    out.json(
+        json!({ "quoted_as": if ratios { "ratio" } else { "ms" }, "points": points, "pictures": pictures }),
+    );
 }

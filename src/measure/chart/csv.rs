@@ -19,6 +19,37 @@ pub fn runs(chart: &Chart) -> String {
     text
 }
 
+/// Every run of every way to draw, its first line the names of the columns.
+pub fn pictures(chart: &Chart) -> String {
+    let mut text = String::from(
+        "scene,dims,width,height,setting,step_voxels,samples,filter,scale,run,raycast_ms,ratio,flip,rmse_levels\r\n",
+    );
+    let [width, height] = chart.plan.pictures;
+    for scene in &chart.scenes {
+        let [x, y, z] = scene.dims;
+        for drawn in &scene.looks.drawn {
+            let (setting, look) = (&drawn.setting, &drawn.setting.look);
+            for (n, [ms, ratio]) in drawn.runs.iter().enumerate() {
+                // Writing to a string cannot fail.
+                let _ = write!(
+                    text,
+                    "{},{x}x{y}x{z},{width},{height},{},{},{},{},{},{},{ms},{ratio},{},{}\r\n",
+                    quoted(&scene.name),
+                    quoted(&setting.name()),
+                    setting.step_voxels,
+                    look.samples,
+                    look.filter.name(),
+                    setting.scale,
+                    n + 1,
+                    drawn.error.flip,
+                    drawn.error.levels
+                );
+            }
+        }
+    }
+    text
+}
+
 /// All stages, in the order in which they first appear.
 fn stages(chart: &Chart) -> Vec<Stage> {
     let mut stages: Vec<Stage> = Vec::new();

@@ -10,11 +10,11 @@ use cao_model::occlusion::Quadrature;
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
 const COLOURS: [&str; 6] = ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73"];
-const GREY: &str = "#777777";
-const FRONT: &str = "#aaaaaa";
+pub(super) const GREY: &str = "#777777";
+pub(super) const FRONT: &str = "#aaaaaa";
 
 /// Radius of a mark.
-const RADIUS: f64 = 4.5;
+pub(super) const RADIUS: f64 = 4.5;
 /// Size of the labels beside marks.
 const SMALL: u32 = 10;
 /// Frames of the panels, and what is around them.
@@ -152,17 +152,7 @@ fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) 
     let [left, right] = [panel.at[0], panel.at[0] + panel.size[0]];
     let front = front_of(marks);
     let place = |mark: &Mark| panel.place(mark.time[1], mark.error);
-    // The front as the stairs that bound what has been reached.
-    let mut stairs: Vec<[f64; 2]> = Vec::new();
-    for &i in &front {
-        let [x, y] = place(&marks[i]);
-        match stairs.last() {
-            Some(&[_, before]) => stairs.extend([[x, before], [x, y]]),
-            None => stairs.extend([[x, panel.at[1]], [x, y]]),
-        }
-    }
-    stairs.extend(stairs.last().map(|&[_, y]| [right, y]));
-    drawing.polyline(&stairs, FRONT, 2.0, false);
+    stairs(drawing, panel, &front.iter().map(|&i| place(&marks[i])).collect::<Vec<_>>());
 
     let mut taken: Vec<[f64; 4]> = Vec::new();
     let mut labels = Vec::new();
@@ -191,8 +181,21 @@ fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) 
     }
 }
 
+/// The front, from the fastest on, as the stairs that bound what has been reached.
+pub(super) fn stairs(drawing: &mut Drawing, panel: &Panel, front: &[[f64; 2]]) {
+    let mut stairs: Vec<[f64; 2]> = Vec::new();
+    for &[x, y] in front {
+        match stairs.last() {
+            Some(&[_, before]) => stairs.extend([[x, before], [x, y]]),
+            None => stairs.extend([[x, panel.at[1]], [x, y]]),
+        }
+    }
+    stairs.extend(stairs.last().map(|&[_, y]| [panel.at[0] + panel.size[0], y]));
+    drawing.polyline(&stairs, FRONT, 2.0, false);
+}
+
 /// Writes a label near a mark where it covers nothing; nowhere if there is no such place.
-fn label(
+pub(super) fn label(
     drawing: &mut Drawing,
     panel: &Panel,
     [x, y]: [f64; 2],

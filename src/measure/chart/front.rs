@@ -29,6 +29,13 @@ pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
     order
 }
 
+/// Which points (quartiles of time, error) beat one of them beyond the noise of its times: no larger an error, and three quarters of their runs
+/// faster than three quarters of its own.
+pub fn beaten(points: &[([f64; 3], f64)], of: usize) -> Vec<usize> {
+    let ([low, ..], error) = points[of];
+    (0..points.len()).filter(|i| points[*i].0[2] < low && points[*i].1 <= error).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -52,5 +59,14 @@ mod tests {
             let beaten = found.iter().any(|f| beats(points[*f], *p));
             assert_eq!(beaten, !found.contains(&i), "{i}");
         }
+    }
+
+    #[test]
+    fn what_is_within_the_noise_beats_nothing() {
+        let point = |time: f64, error: f64| ([0.9 * time, time, 1.1 * time], error);
+        let points = [point(1.0, 0.3), point(0.9, 0.3), point(0.8, 0.3), point(0.7, 0.4), point(0.7, 0.2)];
+        // 0.99 and 0.88 against 0.9; the one that is more in error beats nothing at any speed.
+        assert_eq!(beaten(&points, 0), [2, 4]);
+        assert_eq!(beaten(&points, 4), [0; 0]);
     }
 }

@@ -8,6 +8,8 @@
 pub mod csv;
 pub mod draw;
 pub mod front;
+pub mod looks;
+pub mod looks_draw;
 pub mod peers;
 pub mod pictures;
 pub mod report;
@@ -32,6 +34,7 @@ use cao_model::view::{StereoRig, View};
 use cao_model::volume::Volume;
 use cao_twin::Grid;
 use glam::{Vec2, Vec3};
+use looks::Looks;
 use pictures::Shown;
 use std::sync::Arc;
 
@@ -44,6 +47,8 @@ pub struct Plan {
     pub runs: u32,
     /// Pixels of one eye's image.
     pub size: [u32; 2],
+    /// The same where errors are the picture's own: its reference takes a thousand times the samples.
+    pub pictures: [u32; 2],
     /// The reference.
     pub reference: reference::Plan,
 }
@@ -95,6 +100,11 @@ impl Scene {
             Change::Radius => state.radius_mm *= RADIUS_FACTOR,
         }
         state
+    }
+
+    fn views(&self, size: [u32; 2]) -> Result<[View; 2]> {
+        let far = 3.0 * (self.rig.position - self.rig.target).length();
+        Ok(self.rig.views(size[0] as f32 / size[1] as f32, 0.02 * far, far)?)
     }
 
     fn grid(&self) -> Grid {
@@ -149,6 +159,8 @@ pub struct SceneChart {
     pub draws: Vec<(&'static str, f64)>,
     /// What each method shows, and where it errs; of the first scene only.
     pub pictures: Vec<Shown>,
+    /// The default method's picture, drawn in other ways.
+    pub looks: Looks,
 }
 
 /// What a reference is worth.
@@ -244,8 +256,11 @@ pub fn measure(
     plan: &Plan,
     progress: &mut dyn FnMut(&str, f64),
 ) -> Result<Chart> {
-    if plan.runs == 0 || plan.size.contains(&0) {
-        let problem = format!("{} runs, images of {:?}; expected at least 1 of each", plan.runs, plan.size);
+    if plan.runs == 0 || plan.size.contains(&0) || plan.pictures.contains(&0) {
+        let problem = format!(
+            "{} runs, images of {:?} and {:?}; expected at least 1 of each",
+            plan.runs, plan.size, plan.pictures
+        );
         return Err(Error::refused("chart", problem));
     }
     let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(scene, plan)).sum() };
@@ -291,7 +306,15 @@ impl Work {
         0.2 * samples * (2 * plan.max_voxels.min(scene.volume.len() / 5) + SURFACE) as f64
     }
 
+    /// Of the default picture: a sample of its rays takes as long as ten of the ambient rays, and it has some hundred of them.
+    fn picture(plan: &Plan) -> f64 {
+        1e3 * 2.0 * plan.pictures.map(f64::from).iter().product::<f64>()
+    }
+
     fn of(scene: &Scene, plan: &Plan) -> f64 {
+        let voxel = scene.volume.min_spacing() as f32;
+        let pictures =
+            looks::work(voxel, &looks::settings(voxel, plan.quick), plan.runs) * Self::picture(plan);
         let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
         let entries = contender::all(&asked);
         let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting));
@@ -300,7 +323,7 @@ impl Work {
         let again = baseline.map_or(0.0, |entry| (groups - 1.0) * Self::update(scene, entry));
         let updates = again + entries.iter().map(|entry| Self::update(scene, entry)).sum::<f64>();
         let changes = Change::ALL.len() as f64;
-        changes * (updates * f64::from(plan.runs + 1) + Self::reference(scene, plan)) + updates
+        pictures + changes * (updates * f64::from(plan.runs + 1) + Self::reference(scene, plan)) + updates
     }
 }
 
@@ -313,8 +336,7 @@ fn one(
     say: &mut dyn FnMut(&str, &Work),
 ) -> Result<SceneChart> {
     say("preparing", work);
-    let far = 3.0 * (scene.rig.position - scene.rig.target).length();
-    let views = scene.rig.views(plan.size[0] as f32 / plan.size[1] as f32, 0.02 * far, far)?;
+    let views = scene.views(plan.size)?;
     let arena = Arena { gpu, volume: &scene.volume, views: &views, size: plan.size };
     let mut stand = Stand::new(arena, scene)?;
     let mut truths = Vec::new();
@@ -358,6 +380,7 @@ fn one(
         }
         shown.extend(found.2);
     }
+    let looks = looks_of(gpu, scene, plan, work, say)?;
     shown.sort_by_key(|shown| contender::place(shown.method));
     shown.dedup_by_key(|shown| shown.method);
     let names: Vec<&str> = scene.state.clips.iter().map(|clip| clip.shape.name()).collect();
@@ -373,6 +396,32 @@ fn one(
         points,
         draws,
         pictures: shown,
+        looks,
+    })
+}
+
+/// The scene's picture, drawn in every way, with the default method's ambient values.
+fn looks_of(
+    gpu: &Gpu,
+    scene: &Scene,
+    plan: &Plan,
+    work: &mut Work,
+    say: &mut dyn FnMut(&str, &Work),
+) -> Result<Looks> {
+    say("pictures", work);
+    let voxel = scene.volume.min_spacing();
+    let default = Setup::of(Method::default(), voxel);
+    let occlusion = Occlusion { radius_mm: scene.state.radius_mm, ..default.occlusion };
+    let transfer = scene.state.transfer.clone();
+    let setup = Setup { occlusion, ..default };
+    let mut renderer = Renderer::new(gpu, &scene.volume, transfer, setup, COLOUR)?;
+    renderer.set_clips(&scene.state.clips)?;
+    renderer.update(&mut |_| ())?;
+    let ways = looks::settings(voxel as f32, plan.quick);
+    let views = scene.views(plan.pictures)?;
+    looks::measure(&renderer, &views, plan.pictures, voxel as f32, &ways, plan.runs, &mut |drawn| {
+        work.done += drawn * Work::picture(plan);
+        say("pictures", work);
     })
 }
 

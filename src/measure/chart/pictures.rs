@@ -28,7 +28,7 @@ pub struct Shown {
 pub const SATURATED: f32 = 0.2;
 
 /// Linear grey behind pictures, and where there is no error to show.
-const BACKGROUND: [f32; 3] = [0.008_568_126, 0.009_721_218, 0.012_286_488];
+pub(super) const BACKGROUND: [f32; 3] = [0.008_568_126, 0.009_721_218, 0.012_286_488];
 const NOTHING: [u8; 3] = [0xd8, 0xd8, 0xd8];
 
 /// One setting of each method: the default's own, 26 weighted rays with the segment rule where there are such, else the paper's 26, else any.

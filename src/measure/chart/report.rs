@@ -1,6 +1,7 @@
 //! The report: one HTML file that stands alone. Drawings are inline, pictures are data; nothing is fetched.
 
 use super::draw;
+use super::looks_draw;
 use super::peers::Peers;
 use super::pictures::{SATURATED, Shown};
 use super::tables::{self, escaped};
@@ -49,6 +50,12 @@ pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) 
         }
     }
     body += &methods(chart)?;
+    body += &section(
+        "Error of the picture",
+        "The same ambient values, drawn with other steps, samples and resolutions.",
+    );
+    body += &inline(&looks_draw::draw(chart));
+    body += &tables::pictures(chart);
     body += &section(
         "What can change in real time",
         "Table 1 of the paper has ticks; ours has times, at one setting of each method.",

@@ -1,6 +1,7 @@
 //! The paper's tables with our numbers beside the printed ones (CAO Tables 1 to 3, Fig. 9), as HTML.
 
 use super::draw::{self, Mark, with_spread};
+use super::looks::{self, ERRORS, Looks};
 use super::peers::Peers;
 use super::{BASELINE, Change, Chart, Point, SceneChart};
 use crate::contender::{self, SOLID};
@@ -282,6 +283,31 @@ pub(super) fn everything(chart: &Chart, change: Change) -> String {
         "details",
     ];
     table(&head, 3, &rows)
+}
+
+/// Every way to draw, over all scenes.
+pub(super) fn pictures(chart: &Chart) -> String {
+    let scenes: Vec<&Looks> = chart.scenes.iter().map(|scene| &scene.looks).collect();
+    let marks = looks::marks(&scenes, chart.software);
+    let fronts = ERRORS.map(|(_, error)| looks::front_of(&marks, error));
+    let rows: Vec<Vec<String>> = marks
+        .iter()
+        .enumerate()
+        .map(|(i, mark)| {
+            let on = |front: &Vec<usize>| if front.contains(&i) { "●".into() } else { String::new() };
+            let name = mark.setting.name();
+            vec![
+                on(&fronts[0]),
+                on(&fronts[1]),
+                if mark.setting.is_default() { format!("<b>{name}</b> (default)") } else { name },
+                time(chart, mark.time),
+                format!("{:.4}", mark.error.flip),
+                format!("{:.2}", mark.error.levels),
+            ]
+        })
+        .collect();
+    let time = if chart.software { "ray cast / default's" } else { "ray cast" };
+    table(&["front by FLIP", "by RMSE", "setting", time, "FLIP", "RMSE, levels"], 3, &rows)
 }
 
 /// What `tools/peers` measured.

@@ -12,6 +12,7 @@ pub mod dilation;
 pub mod motion;
 pub mod numbers;
 pub mod page;
+pub mod pixels;
 mod plane_cut;
 pub mod radius;
 pub mod sheets;
@@ -177,11 +178,16 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 10] = [
+pub const TRIALS: [Trial; 11] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
         run: |gpu, effort, progress| stereo::run(gpu, &stereo::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "pixels",
+        title: "Do both eyes' pictures show a surface in the same colours?",
+        run: |gpu, effort, progress| pixels::run(gpu, &pixels::Plan::of(effort), progress),
     },
     Trial {
         name: "motion",
@@ -302,6 +308,6 @@ mod tests {
         for trial in TRIALS {
             assert_eq!(Trial::parse(trial.name).unwrap().title, trial.title);
         }
-        assert!(Trial::parse("colour").is_err_and(|e| e.to_string().contains("stereo, motion")));
+        assert!(Trial::parse("colour").is_err_and(|e| e.to_string().contains("stereo, pixels")));
     }
 }
