@@ -106,7 +106,7 @@ fn plan(args: &Args) -> Plan {
         quick: args.quick,
         runs: args.runs,
         size: if args.quick { [192, 192] } else { [384, 384] },
-        pictures: if args.quick { [48, 48] } else { [128, 128] },
+        pictures: if args.quick { [32, 32] } else { [128, 128] },
         reference: if args.quick { quick } else { full },
     }
 }
