@@ -17,15 +17,7 @@ var<immediate> params: BoundsParams;
 #include "shared/bricks.wgsl"
 #include "shared/distances.wgsl"
 
-@compute @workgroup_size(1)
-fn clear() {
-    for (var axis = 0u; axis < 3u; axis++) {
-        atomicStore(&bounds.from_first[axis], 0u);
-        atomicStore(&bounds.to_last[axis], 0u);
-    }
-}
-
-// One invocation a brick. Looking before asking for a change spares nearly all of them the queue for one address.
+// One invocation a brick; the bounds are 0 before. Looking before asking for a change spares nearly all of them the queue for one address.
 @compute @workgroup_size(LANES)
 fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let index = item_of(id, groups);

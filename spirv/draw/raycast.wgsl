@@ -332,7 +332,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
                         if shown_to {
                             t_from = sides.y;
                             near = at_cut;
-                            cut = hiding(eye.origin.xyz + sides.x * ray.direction);
+                            cut = hiding(ALL_CLIPS, eye.origin.xyz + sides.x * ray.direction);
                             t_cut = sides.y;
                         } else {
                             t_to = sides.y;

@@ -115,27 +115,22 @@ fn inside(c: u32, world: vec3<f32>) -> bool {
     return local_distance(clips.clip[c].kind, rigid / clips.clip[c].scale.xyz) < 0.0;
 }
 
-// Whether none of these clips hides the point: a bit for each.
-fn visible_to(among: u32, world: vec3<f32>) -> bool {
-    for (var c = 0u; c < clips.count; c++) {
-        if (among >> c & 1u) != 0u && inside(c, world) == (clips.clip[c].keep == 0u) {
-            return false;
-        }
-    }
-    return true;
-}
-
 // None of the clips.
 const NO_CLIP = MOST_CLIPS;
 
-// The first clip that hides the point.
-fn hiding(world: vec3<f32>) -> u32 {
+// The first of these clips, a bit for each, that hides the point.
+fn hiding(among: u32, world: vec3<f32>) -> u32 {
     for (var c = 0u; c < clips.count; c++) {
-        if inside(c, world) == (clips.clip[c].keep == 0u) {
+        if (among >> c & 1u) != 0u && inside(c, world) == (clips.clip[c].keep == 0u) {
             return c;
         }
     }
     return NO_CLIP;
+}
+
+// Whether none of them does.
+fn visible_to(among: u32, world: vec3<f32>) -> bool {
+    return hiding(among, world) == NO_CLIP;
 }
 
 fn visible(world: vec3<f32>) -> bool {

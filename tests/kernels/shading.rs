@@ -3,7 +3,6 @@
 //! with the light that they should have, level by level.
 
 use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::Gpu;
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::{LightFrom, Look, Shading};
@@ -47,16 +46,6 @@ fn only_diffuse(light: Vec3) -> Look {
 fn opaque_from(value: f32) -> TransferFunction {
     let step = vec![[value, 0.0], [value, 1.0]];
     TransferFunction::new(step, vec![[0.0, 1.0, 1.0, 1.0]], None).unwrap()
-}
-
-/// A renderer without occlusion.
-fn renderer(gpu: &Gpu, volume: &Volume, transfer: TransferFunction, clips: &[Clip]) -> Renderer {
-    let mut setup = Setup::of(Method::default(), volume.min_spacing());
-    setup.occlusion.radius_mm = 0.0;
-    let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap();
-    renderer.set_clips(clips).unwrap();
-    renderer.update(&mut |_| ()).unwrap();
-    renderer
 }
 
 /// Two views from opposite sides, planes close round the volume so that depths are fine.
@@ -163,7 +152,7 @@ fn surfaces_have_the_normals_of_the_solids_that_were_scanned() {
     for (name, solid) in [("ball", ball as Solid), ("torus", torus), ("gyroid", gyroid)] {
         for (n, edge) in [1.0, 2.0, 4.0].into_iter().enumerate() {
             let volume = scanned(solid, edge, n % 2 == 0);
-            let renderer = renderer(&gpu, &volume, opaque_from(127.5), &[]);
+            let renderer = unoccluded(&gpu, &volume, opaque_from(127.5), &[]);
             // The filter reaches two voxels; nearer to the volume's faces it takes their voxels twice.
             let views = sides(&volume, 30.0 + 50.0 * n as f32, 25.0);
             let places = places(&renderer, &volume, &views, 3.0);
@@ -227,7 +216,7 @@ fn cut_faces_have_the_normals_of_what_cut() {
     let gpu = open();
     let mut random = Random::new(SEED);
     let volume = noise(40, &mut random);
-    let mut renderer = renderer(&gpu, &volume, opaque_from(0.25), &[]);
+    let mut renderer = unoccluded(&gpu, &volume, opaque_from(0.25), &[]);
     let meshes = [convex(), concave(), Arc::new(TriangleMesh::cuboid()), Arc::new(prism())].map(Shape::Mesh);
     let (mut meshes_sum, mut meshes_places) = (0.0, 0);
     for shape in Shape::ANALYTIC.into_iter().chain(meshes) {
@@ -318,7 +307,7 @@ fn a_spherical_cut_has_no_rings() {
         pose: Pose { translate_mm: centre, scale: Vec3::splat(17.3), ..Pose::default() },
         ..Clip::remove(Shape::Sphere)
     };
-    let renderer = renderer(&gpu, &volume, opaque_from(0.25), std::slice::from_ref(&clip));
+    let renderer = unoccluded(&gpu, &volume, opaque_from(0.25), std::slice::from_ref(&clip));
     let rig = StereoRig::framing(volume.size_mm(), 20.0, 15.0);
     let views = rig.views(1.0, 1.0, 400.0).unwrap();
     let look = matt();
@@ -355,7 +344,7 @@ fn flat_cuts_at_any_angle_are_flat() {
     let gpu = open();
     let mut random = Random::new(SEED);
     let volume = noise(48, &mut random);
-    let mut renderer = renderer(&gpu, &volume, opaque_from(0.25), &[]);
+    let mut renderer = unoccluded(&gpu, &volume, opaque_from(0.25), &[]);
     let look = matt();
     let mut compared = 0;
     for turn in 0..12 {
@@ -410,7 +399,7 @@ fn flat_cuts_at_any_angle_are_flat() {
 fn all_views_see_the_light_of_the_first_ones_head() {
     let gpu = open();
     let volume = scanned(ball, 2.0, true);
-    let renderer = renderer(&gpu, &volume, opaque_from(127.5), &[]);
+    let renderer = unoccluded(&gpu, &volume, opaque_from(127.5), &[]);
     let [first, second] = sides(&volume, 30.0, 20.0);
     let look = Look { shading: Shading::Phong, ..Look::default() };
     let draw = |views: &[View; 2], look: &Look| renderer.draw(views, look, [SIZE; 2]).unwrap().0;

@@ -1,13 +1,10 @@
 //! The default camera: what is visible fills the picture of both eyes from any side, whatever is hidden around it.
 
-use cao::renderer::{COLOUR, Renderer, StereoImage};
-use cao_gpu::Gpu;
+use cao::renderer::{Renderer, StereoImage};
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::fit::Fitting;
 use cao_model::look::Look;
-use cao_model::methods::Method;
-use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::{StereoRig, View};
@@ -23,16 +20,6 @@ const FILLED: std::ops::RangeInclusive<f32> = 0.80..=0.90;
 
 /// From here on a pixel is something that one sees, and not the edge of a voxel that fades out.
 const SEEN: f32 = 0.2;
-
-fn renderer(gpu: &Gpu, volume: &Volume, transfer: TransferFunction, clips: &[Clip]) -> Renderer {
-    let mut setup = Setup::of(Method::default(), volume.min_spacing());
-    // Framing knows opacities only.
-    setup.occlusion.radius_mm = 0.0;
-    let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap();
-    renderer.set_clips(clips).unwrap();
-    renderer.update(&mut |_| ()).unwrap();
-    renderer
-}
 
 fn fitting(azimuth_deg: f32, elevation_deg: f32, aspect: f32) -> Fitting {
     let (fov_deg, distance_mm, ipd_mm, screen_mm) = (None, None, None, None);
@@ -137,7 +124,7 @@ fn what_is_visible_fills_both_pictures() {
         ("corner of engine", &engine, auto(&engine), vec![corner]),
         ("half of skeleton", &skeleton, auto(&skeleton), vec![half]),
     ] {
-        let renderer = renderer(&gpu, volume, transfer, &clips);
+        let renderer = unoccluded(&gpu, volume, transfer, &clips);
         for (i, side) in SIDES.into_iter().enumerate() {
             assert_filled(&renderer, side, ASPECTS[i % 3], name);
             assert_filled(&renderer, side, ASPECTS[(i + 1) % 3], name);
@@ -150,7 +137,7 @@ fn what_is_visible_fills_both_pictures() {
 #[test]
 fn a_fog_does_not_count_beside_what_stands_in_it() {
     let gpu = open();
-    let renderer_of = |fog| renderer(&gpu, &ball(fog), identity(), &[]);
+    let renderer_of = |fog| unoccluded(&gpu, &ball(fog), identity(), &[]);
     let (rig, _, image) = picture(&renderer_of(0.002), SIDES[1], 1.0);
     let [low, high] = rectangle(&image, 0, 0.5);
     assert!(FILLED.contains(&(high - low).max_element()), "{low} {high}");
@@ -169,7 +156,7 @@ fn of_nothing_there_is_no_extent_and_of_what_is_out_of_date_neither() {
     let volume = ball(0.0);
     let everything =
         Clip { pose: Pose { scale: Vec3::splat(100.0), ..Pose::default() }, ..Clip::remove(Shape::Sphere) };
-    let mut renderer = renderer(&gpu, &volume, identity(), &[everything]);
+    let mut renderer = unoccluded(&gpu, &volume, identity(), &[everything]);
     assert_eq!(renderer.visible_extent(&[Vec3::X]).unwrap(), None);
     renderer.set_clips(&[]).unwrap();
     let error = renderer.visible_extent(&[Vec3::X]).unwrap_err().to_string();

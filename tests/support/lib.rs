@@ -10,11 +10,13 @@ pub mod wgsl;
 
 use cao::field::Field;
 use cao::field::volume_image;
+use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::{METHODS, Method};
+use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::{StereoRig, View};
@@ -247,4 +249,14 @@ pub fn half_float(bits: u16) -> f32 {
 pub fn eyes(volume: &Volume, azimuth_deg: f32) -> [View; 2] {
     let far = 8.0 * volume.size_mm().iter().sum::<f64>() as f32;
     StereoRig::framing(volume.size_mm(), azimuth_deg, 20.0).views(1.0, far * 1e-3, far).unwrap()
+}
+
+/// A renderer without occlusion, up to date: for what knows opacities and light only.
+pub fn unoccluded(gpu: &Gpu, volume: &Volume, transfer: TransferFunction, clips: &[Clip]) -> Renderer {
+    let mut setup = Setup::of(Method::default(), volume.min_spacing());
+    setup.occlusion.radius_mm = 0.0;
+    let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap();
+    renderer.set_clips(clips).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    renderer
 }

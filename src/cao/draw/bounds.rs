@@ -13,15 +13,13 @@ same_layout!(Content, kernel::GrowingBounds { from_first, to_last });
 
 /// The kernel `bounds`.
 pub struct Bounds {
-    clear: Pipeline,
-    main: Pipeline,
+    pipeline: Pipeline,
 }
 
 impl Bounds {
-    /// Builds the pipelines.
+    /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
-        Ok(Self { clear: pipeline("clear")?, main: pipeline("main")? })
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
     }
 
     /// Memory for the bounds.
@@ -39,9 +37,12 @@ impl Bounds {
     ) -> Result<()> {
         let params = kernel::BoundsParams { bricks: field.bricks(), pad: Default::default() };
         let params = bytemuck::bytes_of(&params);
-        rec.dispatch(&self.clear, &kernel::ClearBindings { bounds }, &[], [1; 3])?;
-        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+        rec.fill(bounds, 0, bounds.bytes(), 0)?;
+        rec.barrier(
+            &[Access::TransferWrite, Access::StorageWrite],
+            &[Access::StorageRead, Access::StorageWrite],
+        );
         let groups = rows_over(field.brick_count(), kernel::MAIN_WORKGROUP);
-        rec.dispatch(&self.main, &kernel::MainBindings { distances, bounds }, params, groups)
+        rec.dispatch(&self.pipeline, &kernel::MainBindings { distances, bounds }, params, groups)
     }
 }

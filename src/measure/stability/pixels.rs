@@ -9,6 +9,7 @@
 //! No highlights: those differ between eyes on real surfaces, too. Control: the same light times occlusion from each eye's depth image
 //! ([`cao_twin::measure::ssao`]), with the same radius.
 
+use super::stereo::{ADULT_MM, DISTANCE_MM, RADIUS, SIZE_MM};
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, evenly, mean, quantile, tiny};
 use crate::Result;
 use crate::plot::short;
@@ -45,18 +46,8 @@ impl Plan {
     }
 }
 
-/// Edge of the volume in mm, as large as a head; and the eyes' distance to its centre: those of `stereo`.
-const SIZE_MM: f64 = 200.0;
-const DISTANCE_MM: f32 = 500.0;
-
-/// Radius of both methods in voxels.
-const RADIUS: f32 = 6.0;
-
 /// Few adults' eyes are farther apart (mm).
 const WIDEST_MM: f64 = 75.0;
-
-/// An average adult's eyes are this far apart (mm): where the sentence quotes the curves.
-const ADULT_MM: f64 = 63.0;
 
 /// Depths of one surface differ by less than this many voxels from pixel to pixel, and between the eyes; at the edge of something
 /// by many more. A wall that is seen at less than some 30° counts as an edge.

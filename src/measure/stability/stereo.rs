@@ -42,14 +42,14 @@ impl Plan {
 }
 
 /// Edge of the volume in mm, as large as a head; and the eyes' distance to its centre.
-const SIZE_MM: f64 = 200.0;
-const DISTANCE_MM: f32 = 500.0;
+pub(super) const SIZE_MM: f64 = 200.0;
+pub(super) const DISTANCE_MM: f32 = 500.0;
 
 /// Radius of both methods in voxels.
-const RADIUS: f32 = 6.0;
+pub(super) const RADIUS: f32 = 6.0;
 
 /// An average adult's eyes are this far apart (mm): where the sentence quotes the curves.
-const ADULT_MM: f64 = 63.0;
+pub(super) const ADULT_MM: f64 = 63.0;
 
 /// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
