@@ -214,14 +214,14 @@ fn what_does_not_fit_is_refused_by_name() {
         let error = error.unwrap_err().to_string();
         assert!(error.contains(word), "{error}");
     }
+    let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&two[..1], SIZE)).unwrap_err();
+    assert!(error.to_string().contains("1 of them, for 2 views"), "{error}");
     let scene = Place { image: &volume, layer: 0, at: [5, 0] };
     let behind = two.clone().into_iter().map(|target| Target { scene: Some(scene), ..target });
     let behind: Vec<_> = behind.collect();
     let error =
         renderer.record_draw(&mut rec, &views, &look, &Targets::new(&behind, SIZE)).unwrap_err().to_string();
     assert!(error.contains("depth of the scene: 37×29 pixels at 5, 0"), "{error}");
-    let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&two[..1], SIZE)).unwrap_err();
-    assert!(error.to_string().contains("1 of them, for 2 views"), "{error}");
     drop((rec, renderer, picture, present));
     close(gpu);
 }
