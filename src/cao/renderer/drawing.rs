@@ -121,18 +121,12 @@ impl Renderer {
     /// Where rays end at what the host has drawn; whether they do.
     fn record_scenes(&self, rec: &mut Recorder, shot: &Shot, drawn: [u32; 2]) -> Result<bool> {
         let Some(targets) = shot.targets else { return Ok(false) };
-        let scenes = || targets.views.iter().map(|target| target.scene);
-        if !scenes().any(|scene| scene.is_some()) {
+        let scenes = targets.views.iter().filter_map(|target| target.scene);
+        if scenes.clone().next().is_none() {
             return Ok(false);
         }
-        if !scenes().all(|scene| scene.is_some()) {
-            return Err(Error::refused(
-                "targets",
-                "some views have a scene's depth and some have none; give all or none",
-            ));
-        }
         rec.stage(stages::SCENE_DEPTH)?;
-        for (i, (view, scene)) in shot.views.iter().zip(scenes().flatten()).enumerate() {
+        for (i, (view, scene)) in shot.views.iter().zip(scenes).enumerate() {
             self.scene_depth.record(rec, (i as u32, view), scene, targets.size, shot.picture, drawn)?;
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         }
@@ -160,10 +154,7 @@ impl Renderer {
         self.current()?;
         look.check()?;
         let size = targets.size;
-        if targets.views.len() != views.len() {
-            let problem = format!("{} of them, for {} views", targets.views.len(), views.len());
-            return Err(Error::refused("targets", problem));
-        }
+        targets.check(views.len())?;
         let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
         let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
         let picture = match presented.take().filter(fits) {
