@@ -220,6 +220,6 @@ fn what_does_not_fit_is_refused_by_name() {
     }
     let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&two[..1], SIZE)).unwrap_err();
     assert!(error.to_string().contains("1 of them, for 2 views"), "{error}");
-    drop((rec, renderer, picture, present));
+    drop((rec, renderer, picture, present, colour, depth, one));
     close(gpu);
 }
