@@ -11,7 +11,7 @@
 const LEAST_RISE = 0.1;
 
 // What a 1 weighs that stands for the air where no voxel beside it has a value.
-const LEAST_WEIGHT = 1e-6;
+const LEAST_WEIGHT = 1e-4;
 
 // The field itself, ones included: they are out of the matter.
 fn ambient_between(position: vec3<f32>) -> f32 {

@@ -450,9 +450,9 @@ fn occluded(
 /// A cube under light from everywhere: walls have all of it, and no edge has more, however much the ambient factor is raised.
 #[test]
 fn edges_have_no_white_rims() {
-    /// Levels of 255 between the lightest pixel and the walls: half of what a trained eye tells from its neighbour (1 %) is 1 at these
-    /// greys, and rays into 50 directions do not find half of the sky exactly.
-    const RIM: f64 = 4.0;
+    /// Levels of 255 between the lightest pixel and the walls: 2 % of the light, the least contrast that eyes see in a picture. Read at
+    /// the place itself there are 24.
+    const RIM: f64 = 2.0;
     /// Of all light, on walls.
     const WALL: f64 = 0.97;
 
@@ -484,15 +484,18 @@ fn edges_have_no_white_rims() {
     close(gpu);
 }
 
-/// A bowl in a block, cut by a ball or scanned so, under light from everywhere: its light changes with the way from its lowest place alone,
-/// and over voxels, not from one to the next.
+/// A bowl in a block, cut by a ball or scanned so, under light from everywhere: its light changes over many voxels, not from one to the next.
 #[test]
 fn bowls_under_ambient_light_have_no_rings() {
-    /// Levels of 255, root mean square.
-    const BAND: f64 = 1.0;
-    /// Voxels of way along the bowl each way, over whose mean light is compared: rings are a voxel wide and more.
+    /// Levels of 255, root mean square, of a cut and of partial volumes: two and three times what rounding to whole levels would make
+    /// of no rings. Read at the place itself they are 0.7 and 1.4.
+    const BANDS: [f64; 2] = [0.6, 1.0];
+    /// Voxels round a place, whose mean its light is compared with: rings are a voxel apart or two.
     const NEAR: f64 = 2.0;
     const BOWL: f64 = 14.3;
+    const PIXELS: u32 = 4 * SIZE;
+    /// Angle at the ball's centre to which it is looked at.
+    const RIM: f64 = 1.1;
 
     let gpu = open();
     let centre = DVec3::new(0.3, -0.4, 12.2);
@@ -503,44 +506,45 @@ fn bowls_under_ambient_light_have_no_rings() {
     };
     let pose = Pose { translate_mm: centre.as_vec3(), scale: Vec3::splat(BOWL as f32), ..Pose::default() };
     let clip = Clip { pose, ..Clip::remove(Shape::Sphere) };
-    for (name, volume, clips) in
-        [("cut", grey([64; 3], block), vec![clip]), ("scanned", grey([64; 3], scanned), vec![])]
-    {
+    let scenes = [("cut", grey([64; 3], block), vec![clip]), ("scanned", grey([64; 3], scanned), vec![])];
+    for ((name, volume, clips), band) in scenes.into_iter().zip(BANDS) {
         let renderer = occluded(&gpu, &volume, 12.0, &clips);
         let rig = StereoRig::framing(volume.0.size_mm(), 20.0, 70.0);
         let views = rig.views(1.0, 1.0, 400.0).unwrap();
-        let look = Look { shading: Shading::Ao, ..Look::default() };
-        let (image, _) = renderer.draw(&views, &look, [2 * SIZE; 2]).unwrap();
+        let look = Look { shading: Shading::Ao, gain: 1.5, ..Look::default() };
+        let (image, _) = renderer.draw(&views, &look, [PIXELS; 2]).unwrap();
         for (colour, view) in image.colour.iter().zip(&views) {
-            // Way along the bowl from its lowest place, and light.
+            // Place from the ball's centre, and light.
             let mut seen = Vec::new();
             for (i, colour) in colour.iter().enumerate() {
-                let pixel =
-                    Vec2::new((i as u32 % (2 * SIZE)) as f32 + 0.5, (i as u32 / (2 * SIZE)) as f32 + 0.5);
-                let (origin, direction) = view.ray(pixel / (2 * SIZE) as f32);
+                let pixel = Vec2::new((i as u32 % PIXELS) as f32 + 0.5, (i as u32 / PIXELS) as f32 + 0.5);
+                let (origin, direction) = view.ray(pixel / PIXELS as f32);
                 let (from, direction) = (origin.as_dvec3() - centre, direction.as_dvec3().normalize());
                 let middle = -from.dot(direction);
                 let root = (middle * middle - from.length_squared() + BOWL * BOWL).sqrt();
-                let way = BOWL * (from + (middle + root) * direction).angle_between(-DVec3::Z);
+                let place = from + (middle + root) * direction;
                 // Below the rim, which has light of its own.
-                if way < 0.8 * BOWL * TAU / 4.0 {
-                    seen.push((way, level(f64::from(colour[0]))));
+                if place.angle_between(-DVec3::Z) < RIM {
+                    seen.push((place, level(f64::from(colour[0]))));
                 }
             }
-            seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let last = seen[seen.len() - 1].0;
-            let off: Vec<f64> = seen
-                .iter()
-                .filter(|(way, _)| (NEAR..last - NEAR).contains(way))
-                .map(|&(way, light)| {
-                    let near = |to: f64| seen.partition_point(|(other, _)| *other < to);
-                    let near = &seen[near(way - NEAR)..near(way + NEAR)];
-                    light - near.iter().map(|(_, light)| light).sum::<f64>() / near.len() as f64
+            let inner = seen.iter().filter(|(place, _)| place.angle_between(-DVec3::Z) < RIM - NEAR / BOWL);
+            let off: Vec<f64> = inner
+                .map(|(place, light)| {
+                    let near = seen.iter().filter(|(other, _)| other.distance_squared(*place) < NEAR * NEAR);
+                    let (sum, count) =
+                        near.fold((0.0, 0.0), |(sum, count), (_, light)| (sum + light, count + 1.0));
+                    light - sum / count
                 })
                 .collect();
-            println!("{name}: {:.2} levels at {} pixels, {:.0} below", rms(&off), off.len(), seen[0].1);
+            println!(
+                "{name}: {:.2} levels at {} pixels, from {:.0} levels on",
+                rms(&off),
+                off.len(),
+                seen.iter().map(|(_, light)| *light).fold(255.0, f64::min)
+            );
             assert!(off.len() > 1000, "{name}: {} pixels look into the bowl", off.len());
-            assert!(rms(&off) <= BAND, "{name}: rings of {} levels", rms(&off));
+            assert!(rms(&off) <= band, "{name}: rings of {} levels", rms(&off));
         }
         drop(renderer);
     }
