@@ -4,8 +4,6 @@
 //! of its command buffers: in the first wgpu itself brings the textures into the state of attachments, the second is ours, takes them
 //! in that state and leaves them in it. What wgpu believes stays true, and what it does next begins with its own barriers.
 
-#![warn(missing_docs)]
-
 use cao::gpu::ash::vk;
 use cao::gpu::{Adopted, Format, Gpu, Image, ImageState, ImageUse, Lent, Recorded, Recorder};
 use std::ops::Deref;
@@ -35,6 +33,11 @@ pub enum Error {
 
 /// What calls return.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// The page's code is compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/embedding/wgpu.md")]
+struct Page;
 
 fn refused(what: impl Into<String>, problem: impl Into<String>) -> Error {
     Error::Refused { what: what.into(), problem: problem.into() }
