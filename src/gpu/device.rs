@@ -348,6 +348,12 @@ impl Gpu {
         self.0.memory.report()
     }
 
+    /// Has all allocations of device memory fail after `count` more, as if the device had no memory left; `None` ends that. For hosts
+    /// that want to know how they bear it.
+    pub fn fail_after(&self, count: Option<u32>) {
+        self.0.memory.fail_after(count);
+    }
+
     /// Most bytes that buffers and images held at once.
     pub fn memory_peak(&self) -> u64 {
         self.0.memory.peak()
