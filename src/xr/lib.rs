@@ -1,0 +1,4 @@
+//! A
+pub mod check;
+pub mod controls;
+pub mod placement;
