@@ -322,3 +322,10 @@ impl Drop for SamplerInner {
         unsafe { self.gpu.device.destroy_sampler(self.raw, None) };
     }
 }
+
+impl Image {
+    /// Interim.
+    pub fn raw(&self) -> vk::Image {
+        self.0.raw
+    }
+}
