@@ -63,6 +63,27 @@ impl Verdict {
     /// The control must fall short by so much: else the picture could not show a difference.
     const BELOW: f64 = 0.1;
 
+    /// Most that the rehearsed clip leaves of what is covered: its hand reaches through the volume. The head moves a little between two
+    /// frames, and with it what is covered.
+    const LEFT_OVER: f64 = 0.85;
+
+    /// What is wrong with this first frame and a last one after it.
+    pub fn problems_until(&self, last: &Self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        for (when, verdict) in [("first", self), ("last", last)] {
+            wrong.extend(verdict.problems().into_iter().map(|problem| format!("{when} frame: {problem}")));
+        }
+        let [before, after] = [self, last].map(|verdict| verdict.covered[0]);
+        if after > before * Self::LEFT_OVER {
+            wrong.push(format!(
+                "the clip takes nothing away: {:.2} % of the pixels are covered at first, {:.2} % at last",
+                before * 100.0,
+                after * 100.0
+            ));
+        }
+        wrong
+    }
+
     /// Looks at both pictures.
     pub fn of(left: &Eye, right: &Eye) -> Self {
         let all = left.colours.len().max(1) as f64;
@@ -80,7 +101,7 @@ impl Verdict {
     }
 
     /// What is wrong, in words; nothing where all is well.
-    pub fn problems(&self) -> Vec<String> {
+    fn problems(&self) -> Vec<String> {
         let mut wrong = Vec::new();
         for (eye, covered) in ["left", "right"].iter().zip(self.covered) {
             if covered < Self::COVERED {
@@ -225,6 +246,16 @@ mod tests {
         let verdict = Verdict::of(&eye(-15.0, |_| 1.0), &eye(15.0, |_| 1.0));
         assert_eq!(verdict.problems(), [""; 0], "{verdict:?}");
         assert!(verdict.points > 800 && verdict.equal > 0.99, "{verdict:?}");
+    }
+
+    #[test]
+    fn a_clip_that_takes_nothing_away_is_found() {
+        let whole = Verdict::of(&eye(-15.0, |_| 1.0), &eye(15.0, |_| 1.0));
+        let cut = Verdict { covered: whole.covered.map(|share| share * 0.6), ..whole };
+        assert_eq!(whole.problems_until(&cut), [""; 0]);
+        assert!(whole.problems_until(&whole).join("").contains("takes nothing away"));
+        let empty = Verdict { covered: [0.0; 2], ..whole };
+        assert!(whole.problems_until(&empty).join("").contains("last frame: the left view is empty"));
     }
 
     #[test]

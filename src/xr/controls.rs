@@ -49,6 +49,22 @@ impl Button {
     }
 }
 
+/// Frames in which the rehearsed hand makes the clip larger, e² times: a clip that reaches from a hand at rest to what is before the head.
+const GROWING: u64 = 40;
+/// Frames in which it pulls the trigger.
+const PULLS: [u64; 2] = [60, 80];
+
+/// Seconds between two frames of a rehearsal, however long they took: it is the same everywhere.
+pub const REHEARSED_S: f32 = 0.05;
+
+/// What the right hand does in a check, where no finger moves: it makes the clip larger, then goes through shapes. Its place is the
+/// runtime's.
+pub fn rehearsed([left, right]: [Hand; 2], frame: u64) -> [Hand; 2] {
+    let stick = if frame < GROWING { 1.0 } else { 0.0 };
+    let trigger = if PULLS.contains(&frame) { 1.0 } else { 0.0 };
+    [left, Hand { stick, trigger, ..right }]
+}
+
 /// The shapes, in the order in which the trigger goes through them.
 const SHAPES: [Shape; 6] =
     [Shape::Sphere, Shape::Box, Shape::Cylinder, Shape::Cone, Shape::Torus, Shape::Plane];
@@ -249,6 +265,17 @@ mod tests {
         assert!((push(&mut c, 1.0, 10_000, FRAME) - 1000.0).abs() < 0.1);
         assert!((push(&mut c, -1.0, 10_000, FRAME) - 2.0).abs() < 1e-3);
         assert!(c.clip().unwrap().check(50.0).is_ok(), "the smallest is a clip still");
+    }
+
+    #[test]
+    fn the_rehearsal_ends_with_a_large_clip_of_another_shape() {
+        let mut c = controls();
+        for frame in 0..100 {
+            c.step(&rehearsed(right(Hand { grip: at(0.0), ..Hand::default() }), frame), REHEARSED_S);
+        }
+        let clip = c.clip().unwrap();
+        assert_eq!(clip.shape.name(), "cylinder");
+        assert!((clip.pose.scale.x - 50.0 * 2.0_f32.exp()).abs() < 1.0, "{:?}", clip.pose);
     }
 
     #[test]

@@ -7,13 +7,12 @@ use cao::glam::{Quat, Vec3};
 use openxr as xr;
 
 /// What each kind of controller has for trigger, squeeze and thumbstick; an empty name where it has nothing. All have `grip/pose`.
-const PROFILES: [(&str, [&str; 3]); 6] = [
+const PROFILES: [(&str, [&str; 3]); 5] = [
     ("khr/simple_controller", ["select/click", "menu/click", ""]),
     ("oculus/touch_controller", ["trigger/value", "squeeze/value", "thumbstick/y"]),
     ("valve/index_controller", ["trigger/value", "squeeze/value", "thumbstick/y"]),
     ("htc/vive_controller", ["trigger/value", "squeeze/click", "trackpad/y"]),
     ("microsoft/motion_controller", ["trigger/value", "squeeze/click", "thumbstick/y"]),
-    ("hp/mixed_reality_controller", ["trigger/value", "squeeze/value", "thumbstick/y"]),
 ];
 
 /// The left and the right hand.

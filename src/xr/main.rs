@@ -93,7 +93,7 @@ fn print(runtime: &Runtime, report: &Report) -> Result<()> {
     writeln!(out, "session: {}", states.join(", "))?;
     writeln!(out, "frames:  {}, {} of them with a clip; 2 × {width}×{height}, {depth}", report.frames, report.clipped)?;
     writeln!(out, "device:  {:.2} ms a frame", ms / count.max(1) as f64)?;
-    if let Some(v) = &report.verdict {
+    for v in &report.verdicts {
         let [left, right] = v.covered.map(|share| share * 100.0);
         writeln!(out, "views:   {left:.1} and {right:.1} % covered, {:.1} % of the pixels differ", v.different * 100.0)?;
         writeln!(
@@ -115,9 +115,9 @@ fn check(report: &Report, messages: &[String], frames: u64) -> Result<()> {
     if report.frames < frames {
         wrong.push(format!("{} frames were drawn, expected {frames}", report.frames));
     }
-    match &report.verdict {
-        Some(verdict) => wrong.extend(verdict.problems()),
-        None => wrong.push("no frame was read back".into()),
+    match &report.verdicts[..] {
+        [first, last] => wrong.extend(first.problems_until(last)),
+        other => wrong.push(format!("{} frames were read back, expected the first and the last", other.len())),
     }
     if !messages.is_empty() {
         wrong.push(format!("the validation layer reported {} problems:\n{}", messages.len(), messages.join("\n")));

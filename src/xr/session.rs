@@ -1,7 +1,7 @@
 //! A session: its states, and the frames that are drawn while there is one.
 
 use crate::check::{Eye, Verdict};
-use crate::controls::Controls;
+use crate::controls::{Controls, REHEARSED_S, rehearsed};
 use crate::device::Device;
 use crate::input::{Input, located, rigid};
 use crate::placement::{Placement, Rigid};
@@ -37,7 +37,7 @@ pub struct Show {
 pub struct Plan<'a> {
     /// So many frames that are shown, then the session ends; `None`: until the runtime or the user ends it.
     pub frames: Option<u64>,
-    /// Read back what was drawn last.
+    /// The right hand does what is rehearsed, and what was drawn first and last is read back.
     pub check: bool,
     /// Set from elsewhere to end the session.
     pub stop: &'a AtomicBool,
@@ -58,8 +58,8 @@ pub struct Report {
     pub clipped: u64,
     /// ms of the device, of all frames whose times are known, and their number.
     pub device_ms: (f64, u64),
-    /// What the last frame's pictures are.
-    pub verdict: Option<Verdict>,
+    /// What the first and the last frame's pictures are.
+    pub verdicts: Vec<Verdict>,
 }
 
 /// Frames that the device may be behind.
@@ -234,7 +234,7 @@ impl<'a> Frames<'a> {
                 leaving = true;
             }
             match running {
-                true => self.one()?,
+                true => self.one(leaving)?,
                 // Nobody looks, and nothing says when that changes but events.
                 false => std::thread::sleep(Duration::from_millis(20)),
             }
@@ -242,19 +242,18 @@ impl<'a> Frames<'a> {
     }
 
     /// One frame: wait, begin, what hands do, acquire, late locate, record, submit, release, end.
-    fn one(&mut self) -> Result<()> {
+    /// Who is leaving draws no more.
+    fn one(&mut self, leaving: bool) -> Result<()> {
         let frame = self.waiter.wait()?;
         self.stream.begin()?;
         let time = frame.predicted_display_time;
         if self.eyes.is_none() {
             self.eyes = self.located(time)?;
         }
-        let (true, Some(_)) = (frame.should_render, self.eyes) else {
+        let (true, Some(_)) = (frame.should_render && !leaving, self.eyes) else {
             return Ok(self.stream.end(time, self.blend, &[])?);
         };
         self.hands(time)?;
-        // The device is at most so many frames behind.
-        let last = self.plan.frames.is_some_and(|frames| self.report.frames + 1 >= frames);
         let slot = self.report.frames as usize % AHEAD;
         let (cmd, fence) = self.free(slot)?;
         // SAFETY: the command buffer is recording and submitted once below; the recording is kept in its slot until the fence says that it
@@ -281,7 +280,9 @@ impl<'a> Frames<'a> {
         let recorded = rec.finish()?;
         // SAFETY: interim.
         unsafe { self.targets.copy(cmd) };
-        let read = (self.plan.check && last).then(|| self.read(cmd)).transpose()?;
+        let last = self.plan.frames == Some(self.report.frames + 1);
+        let reads = self.plan.check && (self.report.frames == 0 || last);
+        let read = reads.then(|| self.read(cmd)).transpose()?;
         // SAFETY: the command buffer is recording and of this device, and the fence is not in use.
         unsafe {
             self.device.raw.end_command_buffer(cmd)?;
@@ -292,7 +293,7 @@ impl<'a> Frames<'a> {
         if let Some([colours, depths]) = read {
             // SAFETY: the fence is of this device and was submitted.
             unsafe { self.device.raw.wait_for_fences(&[fence], true, u64::MAX)? };
-            self.report.verdict = Some(verdict(self.targets.size, views, colours.pixels()?, depths.pixels()?));
+            self.report.verdicts.push(verdict(self.targets.size, views, colours.pixels()?, depths.pixels()?));
         }
         self.targets.release()?;
         self.targets.end(&mut self.stream, &self.room, time, self.blend, &eyes)?;
@@ -315,10 +316,13 @@ impl<'a> Frames<'a> {
             let placement = Placement::in_front_of(head, size_mm, self.show.turn);
             self.controls = Some(Controls::new(placement, size_mm));
         }
-        let hands = self.input.read(&self.session, &self.room, time)?;
-        let seconds = self.last.map_or(0.0, |last| (time.as_nanos() - last.as_nanos()) as f32 * 1e-9);
+        let mut hands = self.input.read(&self.session, &self.room, time)?;
+        let mut seconds = self.last.map_or(0.0, |last| (time.as_nanos() - last.as_nanos()) as f32 * 1e-9);
         self.last = Some(time);
         let Some(controls) = &mut self.controls else { return Ok(()) };
+        if self.plan.check {
+            (hands, seconds) = (rehearsed(hands, self.report.frames), REHEARSED_S);
+        }
         controls.step(&hands, seconds);
         let clip = controls.clip();
         self.report.clipped += u64::from(clip.is_some());
