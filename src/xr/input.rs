@@ -1,5 +1,7 @@
 //! Hands: what the runtime calls an action, and what each kind of controller has for it.
 
+#![forbid(unsafe_code)]
+
 use crate::controls::Hand;
 use crate::placement::Rigid;
 use anyhow::Result;

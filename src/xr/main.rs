@@ -1,5 +1,7 @@
 //! The program `cao-xr`: a volume in an OpenXR headset.
 
+#![forbid(unsafe_code)]
+
 use anyhow::{Result, bail};
 use cao::model::frame::Frame;
 use cao::{Look, Method};

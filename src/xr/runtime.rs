@@ -29,8 +29,8 @@ impl Runtime {
                  and a runtime: SteamVR, Monado or that of the headset's maker"
             )
         })?;
-        let none = "the OpenXR loader finds no runtime that answers; start SteamVR, Monado (`monado-service`) or that of the headset's \
-                    maker, or name its manifest in XR_RUNTIME_JSON. Without a headset: tools/openxr";
+        let none = "no OpenXR runtime answers; start SteamVR, Monado (monado-service) or that of the headset's maker, or name its manifest \
+                    in XR_RUNTIME_JSON; tools/openxr runs one without a headset";
         let offered = entry.enumerate_extensions().context(none)?;
         if !offered.khr_vulkan_enable2 {
             bail!("this OpenXR runtime has no Vulkan (XR_KHR_vulkan_enable2); expected one that has");
