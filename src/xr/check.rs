@@ -92,7 +92,8 @@ impl Verdict {
         let (others, control) = lit(left, right, ASIDE);
         let share = |some: usize, of: usize| some as f64 / of.max(1) as f64;
         Self {
-            covered: [left, right].map(|eye| (0..eye.colours.len()).filter(|&i| eye.shows(i)).count() as f64 / all),
+            covered: [left, right]
+                .map(|eye| (0..eye.colours.len()).filter(|&i| eye.shows(i)).count() as f64 / all),
             different: differing as f64 / all,
             points,
             equal: share(equal, points),
@@ -105,14 +106,24 @@ impl Verdict {
         let mut wrong = Vec::new();
         for (eye, covered) in ["left", "right"].iter().zip(self.covered) {
             if covered < Self::COVERED {
-                wrong.push(format!("the {eye} view is empty: {:.2} % of its pixels show something", covered * 100.0));
+                wrong.push(format!(
+                    "the {eye} view is empty: {:.2} % of its pixels show something",
+                    covered * 100.0
+                ));
             }
         }
         if self.different < Self::DIFFERENT {
-            wrong.push(format!("both views are the same: {:.2} % of the pixels differ", self.different * 100.0));
+            wrong.push(format!(
+                "both views are the same: {:.2} % of the pixels differ",
+                self.different * 100.0
+            ));
         }
         if self.points < Self::POINTS {
-            wrong.push(format!("only {} points are seen by both eyes, expected {}", self.points, Self::POINTS));
+            wrong.push(format!(
+                "only {} points are seen by both eyes, expected {}",
+                self.points,
+                Self::POINTS
+            ));
         }
         if self.equal < Self::EQUAL {
             wrong.push(format!(

@@ -119,7 +119,9 @@ fn instance(
         // SAFETY: a plain query of the loader.
         let there = unsafe { entry.enumerate_instance_layer_properties() }.unwrap_or_default();
         if !there.iter().any(|layer| layer.layer_name_as_c_str() == Ok(ValidationLog::LAYER)) {
-            bail!("validation was asked for, but its layer is missing; on Debian or Ubuntu `apt install vulkan-validationlayers`");
+            bail!(
+                "validation was asked for, but its layer is missing; on Debian or Ubuntu `apt install vulkan-validationlayers`"
+            );
         }
         layers.push(ValidationLog::LAYER.as_ptr());
         extensions.push(ash::ext::debug_utils::NAME.as_ptr());
@@ -130,16 +132,11 @@ fn instance(
     let create = create.enabled_layer_names(&layers).enabled_extension_names(&extensions);
     // SAFETY: `create` and what it points to live until the call returns; the log outlives the instance (`Device`).
     let made = unsafe {
-        runtime.instance.create_vulkan_instance(
-            runtime.system,
-            proc_addr(entry),
-            (&raw const create).cast(),
-        )
+        runtime.instance.create_vulkan_instance(runtime.system, proc_addr(entry), (&raw const create).cast())
     };
     let raw = made?.map_err(|code| vulkan("vkCreateInstance", code))?;
     // SAFETY: the runtime made it with this entry's functions.
-    let instance =
-        unsafe { ash::Instance::load(entry.static_fn(), vk::Instance::from_raw(raw as u64)) };
+    let instance = unsafe { ash::Instance::load(entry.static_fn(), vk::Instance::from_raw(raw as u64)) };
     let messenger = log.map(|log| {
         let functions = ash::ext::debug_utils::Instance::new(entry, &instance);
         // SAFETY: the log is held by `Device`, which destroys the messenger.
@@ -161,9 +158,8 @@ fn open(
     instance: &ash::Instance,
 ) -> Result<(vk::PhysicalDevice, ash::Device, u32)> {
     // SAFETY: the instance is the one that the runtime made, and alive.
-    let physical = unsafe {
-        runtime.instance.vulkan_graphics_device(runtime.system, instance.handle().as_raw() as _)
-    }?;
+    let physical =
+        unsafe { runtime.instance.vulkan_graphics_device(runtime.system, instance.handle().as_raw() as _) }?;
     let physical = vk::PhysicalDevice::from_raw(physical as u64);
     let needs = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     // SAFETY: the runtime took it from this instance.
@@ -187,9 +183,9 @@ fn open(
             (&raw const create).cast(),
         )
     };
-    let raw = made?.map_err(|code| vulkan("vkCreateDevice", code)).with_context(
-        || "the headset's device lacks something that cao needs; `cao devices` says what",
-    )?;
+    let raw = made?
+        .map_err(|code| vulkan("vkCreateDevice", code))
+        .with_context(|| "the headset's device lacks something that cao needs; `cao devices` says what")?;
     // SAFETY: the runtime made it of this instance.
     let raw = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw as u64)) };
     Ok((physical, raw, family))

@@ -78,7 +78,8 @@ impl Input {
         session.sync_actions(&[(&self.set).into()])?;
         let mut hands = [Hand::default(); 2];
         for (i, hand) in hands.iter_mut().enumerate() {
-            let value = |action: &xr::Action<f32>| action.state(session, self.hands[i]).map(|s| s.current_state);
+            let value =
+                |action: &xr::Action<f32>| action.state(session, self.hands[i]).map(|s| s.current_state);
             let [trigger, squeeze, stick] = &self.values;
             *hand = Hand {
                 grip: located(&self.grips[i].locate(space, time)?),

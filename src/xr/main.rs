@@ -90,14 +90,22 @@ fn print(runtime: &Runtime, report: &Report) -> Result<()> {
     let states: Vec<_> = report.states.iter().map(|state| format!("{state:?}")).collect();
     let [width, height] = report.size;
     let depth = if report.depth { "colour and depth" } else { "colour, no depth" };
-    let (ms, count) = report.device_ms;
+    let [total, drawing] = report.device_ms.map(|ms| ms / report.timed.max(1) as f64);
     writeln!(out, "runtime: {}", runtime.name())?;
     writeln!(out, "session: {}", states.join(", "))?;
-    writeln!(out, "frames:  {}, {} of them with a clip; 2 × {width}×{height}, {depth}", report.frames, report.clipped)?;
-    writeln!(out, "device:  {:.2} ms a frame", ms / count.max(1) as f64)?;
+    writeln!(
+        out,
+        "frames:  {}, {} of them with a clip; 2 × {width}×{height}, {depth}",
+        report.frames, report.clipped
+    )?;
+    writeln!(out, "device:  {total:.2} ms a frame, {drawing:.2} of them for drawing")?;
     for v in &report.verdicts {
         let [left, right] = v.covered.map(|share| share * 100.0);
-        writeln!(out, "views:   {left:.1} and {right:.1} % covered, {:.1} % of the pixels differ", v.different * 100.0)?;
+        writeln!(
+            out,
+            "views:   {left:.1} and {right:.1} % covered, {:.1} % of the pixels differ",
+            v.different * 100.0
+        )?;
         writeln!(
             out,
             "points:  {} seen by both eyes, {:.2} % of them equally lit (control: {:.2} %)",
@@ -119,10 +127,16 @@ fn check(report: &Report, messages: &[String], frames: u64) -> Result<()> {
     }
     match &report.verdicts[..] {
         [first, last] => wrong.extend(first.problems_until(last)),
-        other => wrong.push(format!("{} frames were read back, expected the first and the last", other.len())),
+        other => {
+            wrong.push(format!("{} frames were read back, expected the first and the last", other.len()))
+        }
     }
     if !messages.is_empty() {
-        wrong.push(format!("the validation layer reported {} problems:\n{}", messages.len(), messages.join("\n")));
+        wrong.push(format!(
+            "the validation layer reported {} problems:\n{}",
+            messages.len(),
+            messages.join("\n")
+        ));
     }
     if wrong.is_empty() {
         return Ok(());

@@ -55,7 +55,7 @@ pub struct Placement {
 
 impl Placement {
     /// How far in front of the head the volume first stands, m.
-    const AWAY_M: f32 = 0.8;
+    const AWAY_M: f32 = 0.7;
     /// How large its longest edge first is, m.
     const EDGE_M: f32 = 0.4;
     /// Bounds of that edge: a volume smaller or larger is lost.
@@ -87,13 +87,7 @@ impl Placement {
     /// The eye with this pose and field of view, for the renderer. Depths are those of [`NEAR_M`] and [`FAR_M`].
     pub fn view(&self, eye: Rigid, tan: Tangents) -> View {
         let (position, orientation) = self.to_volume(eye);
-        View {
-            position,
-            orientation,
-            tan,
-            near_mm: NEAR_M / self.metres,
-            far_mm: FAR_M / self.metres,
-        }
+        View { position, orientation, tan, near_mm: NEAR_M / self.metres, far_mm: FAR_M / self.metres }
     }
 
     /// Larger by a factor, in bounds, around a point of the room that stays where it is in the volume.
@@ -134,7 +128,7 @@ mod tests {
     fn the_volume_first_stands_before_the_head_face_to_face() {
         let placed = Placement::in_front_of(head(), SIZE, Turn::NONE);
         let to_head = head().position - placed.pose.position;
-        assert!((to_head.length() - 0.8).abs() < 1e-5 && to_head.y.abs() < 1e-5, "{to_head}");
+        assert!((to_head.length() - Placement::AWAY_M).abs() < 1e-5 && to_head.y.abs() < 1e-5, "{to_head}");
         assert!((placed.metres * 200.0 - 0.4).abs() < 1e-6);
         // Superior is up, anterior towards the head, the patient's right at the viewer's left.
         assert!((placed.pose.orientation * Vec3::Z - Vec3::Y).length() < 1e-5);
@@ -153,8 +147,7 @@ mod tests {
             pose: Rigid { position: Vec3::new(0.0, 1.0, -1.0), orientation: Quat::IDENTITY },
             metres: 0.001,
         };
-        let (mm, turned) =
-            placed.to_volume(Rigid { position: Vec3::new(0.1, 1.0, -1.0), ..Rigid::IDENTITY });
+        let (mm, turned) = placed.to_volume(Rigid { position: Vec3::new(0.1, 1.0, -1.0), ..Rigid::IDENTITY });
         assert!((mm - Vec3::new(100.0, 0.0, 0.0)).length() < ROUNDING && turned == Quat::IDENTITY);
     }
 
@@ -170,10 +163,8 @@ mod tests {
         let room = placed.pose.position + placed.pose.orientation * (mm * placed.metres);
         let local = eye.orientation.conjugate() * (room - eye.position);
         let slope = local / -local.z;
-        let expected = [
-            (slope.x - tan.left) / (tan.right - tan.left),
-            (tan.up - slope.y) / (tan.up - tan.down),
-        ];
+        let expected =
+            [(slope.x - tan.left) / (tan.right - tan.left), (tan.up - slope.y) / (tan.up - tan.down)];
         let (uv, depth) = view.project(mm).unwrap();
         assert!((uv.x - expected[0]).abs() < 1e-4 && (uv.y - expected[1]).abs() < 1e-4, "{uv} {expected:?}");
         // Depth is the room's between the planes in metres, which the runtime is told.

@@ -34,7 +34,8 @@ impl<'a> ReadBack<'a> {
                 needs.memory_type_bits >> i & 1 == 1
                     && kinds.memory_types[*i as usize].property_flags.contains(wanted)
             };
-            let kind = (0..kinds.memory_type_count).find(fits).context("no memory that the processor reads")?;
+            let kind =
+                (0..kinds.memory_type_count).find(fits).context("no memory that the processor reads")?;
             let allocate =
                 vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind);
             made.memory = device.raw.allocate_memory(&allocate, None)?;
@@ -94,8 +95,7 @@ impl<'a> ReadBack<'a> {
         unsafe {
             device.cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&before));
             device.cmd_copy_image_to_buffer(cmd, image, L::TRANSFER_SRC_OPTIMAL, self.buffer, &[copy]);
-            let after =
-                vk::DependencyInfo::default().image_memory_barriers(&after).memory_barriers(&to_host);
+            let after = vk::DependencyInfo::default().image_memory_barriers(&after).memory_barriers(&to_host);
             device.cmd_pipeline_barrier2(cmd, &after);
         }
     }

@@ -52,7 +52,9 @@ impl Runtime {
         })?;
         let views = instance.enumerate_view_configurations(system)?;
         if !views.contains(&VIEWS) {
-            bail!("this headset does not show one view for each of two eyes; expected stereo, offered is {views:?}");
+            bail!(
+                "this headset does not show one view for each of two eyes; expected stereo, offered is {views:?}"
+            );
         }
         Ok(Self { instance, system, depth: offered.khr_composition_layer_depth })
     }

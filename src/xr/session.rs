@@ -56,8 +56,10 @@ pub struct Report {
     pub depth: bool,
     /// Frames in which a clip was in a hand.
     pub clipped: u64,
-    /// ms of the device, of all frames whose times are known, and their number.
-    pub device_ms: (f64, u64),
+    /// Frames whose times are known.
+    pub timed: u64,
+    /// Of all these the ms of the device: in total, and for drawing.
+    pub device_ms: [f64; 2],
     /// What the first and the last frame's pictures are.
     pub verdicts: Vec<Verdict>,
 }
@@ -266,9 +268,7 @@ impl<'a> Frames<'a> {
         if let Some(eyes) = self.located(time)? {
             self.eyes = Some(eyes);
         }
-        let (Some(eyes), Some(controls)) = (self.eyes, &self.controls) else {
-            unreachable!("seen above")
-        };
+        let (Some(eyes), Some(controls)) = (self.eyes, &self.controls) else { unreachable!("seen above") };
         let views = eyes.map(|eye| controls.placement.view(rigid(eye.pose), tangents(eye.fov)));
         let period = frame.predicted_display_period.as_nanos() as f64 * 1e-6;
         // A frame later than this is shown late; what is checked has to be all there.
@@ -337,14 +337,19 @@ impl<'a> Frames<'a> {
         unsafe {
             device.wait_for_fences(&[slot.fence], true, u64::MAX)?;
             device.reset_fences(&[slot.fence])?;
-            device.begin_command_buffer(slot.cmd, &vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT))?;
+            device.begin_command_buffer(
+                slot.cmd,
+                &vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT),
+            )?;
         }
         if let Some((recorded, drawn)) = slot.pending.take()
             && let Some(timings) = recorded.timings()?
         {
-            self.renderer.drew(&drawn, timings.of(Phase::Draw));
-            self.report.device_ms.0 += timings.total();
-            self.report.device_ms.1 += 1;
+            let drawing = timings.of(Phase::Draw);
+            self.renderer.drew(&drawn, drawing);
+            self.report.device_ms[0] += timings.total();
+            self.report.device_ms[1] += drawing;
+            self.report.timed += 1;
         }
         Ok((slot.cmd, slot.fence))
     }
@@ -354,7 +359,8 @@ impl<'a> Frames<'a> {
         use vk::{ImageAspectFlags as Aspect, ImageLayout as Layout};
         let (colour, depth) = self.targets.current();
         let depth = depth.context("the check needs depths, and this runtime takes none")?;
-        let copies = [ReadBack::new(self.device, self.targets.size)?, ReadBack::new(self.device, self.targets.size)?];
+        let copies =
+            [ReadBack::new(self.device, self.targets.size)?, ReadBack::new(self.device, self.targets.size)?];
         // SAFETY: the images are ours until they are released, in the layouts in which the runtime takes them back; the caller waits.
         unsafe {
             copies[0].record(cmd, colour, Aspect::COLOR, Layout::COLOR_ATTACHMENT_OPTIMAL);

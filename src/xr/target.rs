@@ -79,7 +79,9 @@ impl Targets {
             .iter()
             .map(|view| [view.recommended_image_rect_width, view.recommended_image_rect_height])
             .collect();
-        let [left, right] = sizes[..] else { bail!("{} views, expected one for each of two eyes", sizes.len()) };
+        let [left, right] = sizes[..] else {
+            bail!("{} views, expected one for each of two eyes", sizes.len())
+        };
         let size = [left[0].max(right[0]), left[1].max(right[1])];
         let formats = session.enumerate_swapchain_formats()?;
         let offered = |format: vk::Format| formats.contains(&(format.as_raw() as u32));
@@ -145,16 +147,10 @@ impl Targets {
                 )
         };
         let mut before = vec![turn(colour, I::COLOR, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL)];
-        let mut after =
-            vec![turn(colour, I::COLOR, L::TRANSFER_DST_OPTIMAL, L::COLOR_ATTACHMENT_OPTIMAL)];
+        let mut after = vec![turn(colour, I::COLOR, L::TRANSFER_DST_OPTIMAL, L::COLOR_ATTACHMENT_OPTIMAL)];
         if let Some(depth) = depth {
             before.push(turn(depth, I::DEPTH, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL));
-            after.push(turn(
-                depth,
-                I::DEPTH,
-                L::TRANSFER_DST_OPTIMAL,
-                L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
-            ));
+            after.push(turn(depth, I::DEPTH, L::TRANSFER_DST_OPTIMAL, L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL));
         }
         let all = [vk::MemoryBarrier2::default()
             .src_stage_mask(S::ALL_COMMANDS)
@@ -218,7 +214,11 @@ impl Targets {
         };
         let part = |chain: &Chain, eye: u32| {
             // SAFETY: a builder's call.
-            xr::SwapchainSubImage::new().swapchain(&chain.handle).image_array_index(eye).image_rect(rect).into_raw()
+            xr::SwapchainSubImage::new()
+                .swapchain(&chain.handle)
+                .image_array_index(eye)
+                .image_rect(rect)
+                .into_raw()
         };
         let depths = self.depth.as_ref().map(|chain| {
             [0, 1].map(|eye| xr::sys::CompositionLayerDepthInfoKHR {

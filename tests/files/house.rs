@@ -110,13 +110,8 @@ const CRATES: &[Crate] = &[
 const UNSAFE_IN: [&str; 2] = ["src/gpu", "src/xr"];
 
 /// Files of those crates that need none, and forbid it too.
-const SAFE_THERE: [&str; 5] = [
-    "src/xr/check.rs",
-    "src/xr/controls.rs",
-    "src/xr/input.rs",
-    "src/xr/main.rs",
-    "src/xr/placement.rs",
-];
+const SAFE_THERE: [&str; 5] =
+    ["src/xr/check.rs", "src/xr/controls.rs", "src/xr/input.rs", "src/xr/main.rs", "src/xr/placement.rs"];
 
 /// Crates that deny it but for one promise, `Shader::new`, and the files that make it: what the build emits for each kernel, and what
 /// hands the device the kernels of tests.
@@ -671,7 +666,10 @@ fn every_file_of_tests_belongs_to_an_executable() {
     // Cargo finds no test by itself here, and is told of each.
     let targets = |manifest: &str| toml(manifest)["test"].as_array().unwrap().len();
     let mains = files.keys().filter(|file| file.ends_with("/main.rs")).count();
-    assert_eq!(["Cargo.toml", "src/cli/Cargo.toml", "src/xr/Cargo.toml"].map(targets).iter().sum::<usize>(), mains);
+    assert_eq!(
+        ["Cargo.toml", "src/cli/Cargo.toml", "src/xr/Cargo.toml"].map(targets).iter().sum::<usize>(),
+        mains
+    );
 
     let planted = |main: &str| {
         BTreeMap::from([
