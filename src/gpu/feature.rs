@@ -13,7 +13,6 @@ pub const EXTENSIONS: &[&CStr] = &[ash::khr::push_descriptor::NAME];
 #[derive(Default)]
 pub struct Features {
     core: vk::PhysicalDeviceFeatures,
-    v11: vk::PhysicalDeviceVulkan11Features<'static>,
     v13: vk::PhysicalDeviceVulkan13Features<'static>,
 }
 
@@ -30,12 +29,8 @@ impl Features {
     /// The structs linked into a chain that `vkCreateDevice` and `vkGetPhysicalDeviceFeatures2` take.
     pub fn chain(&mut self) -> vk::PhysicalDeviceFeatures2<'_> {
         // A chain of an earlier call would dangle into a moved struct.
-        self.v11.p_next = std::ptr::null_mut();
         self.v13.p_next = std::ptr::null_mut();
-        vk::PhysicalDeviceFeatures2::default()
-            .features(self.core)
-            .push_next(&mut self.v11)
-            .push_next(&mut self.v13)
+        vk::PhysicalDeviceFeatures2::default().features(self.core).push_next(&mut self.v13)
     }
 
     /// Asks a device for what it can do.
@@ -72,7 +67,6 @@ pub const FEATURES: &[Feature] = &[
         why: "drawing without render pass objects",
         field: |f| &mut f.v13.dynamic_rendering,
     },
-    Feature { name: "multiview", why: "both eyes in one pass", field: |f| &mut f.v11.multiview },
     Feature {
         name: "shaderStorageImageExtendedFormats",
         why: "r8 storage images",
@@ -191,7 +185,7 @@ mod tests {
         assert!(Features::required().missing().is_empty());
         assert_eq!(Features::default().missing().len(), FEATURES.len());
         let mut but_one = Features::required();
-        *(FEATURES[2].field)(&mut but_one) = vk::FALSE;
-        assert_eq!(but_one.missing(), ["feature multiview (both eyes in one pass)"]);
+        *(FEATURES[0].field)(&mut but_one) = vk::FALSE;
+        assert_eq!(but_one.missing(), ["feature synchronization2 (barriers)"]);
     }
 }

@@ -197,11 +197,11 @@ mod tests {
     fn a_graphics_card_is_preferred_unless_it_lacks_something() {
         let soft = device("llvmpipe", DeviceKind::Cpu, &[]);
         let card = device("Card 5000", DeviceKind::Discrete, &[]);
-        let old = device("Old Card", DeviceKind::Discrete, &["feature multiview"]);
+        let old = device("Old Card", DeviceKind::Discrete, &["feature synchronization2"]);
         assert_eq!(choose(&[soft.clone(), old.clone(), card.clone()], None).unwrap(), 2);
         assert_eq!(choose(&[old.clone(), soft.clone()], None).unwrap(), 1);
         let message = choose(&[old], None).unwrap_err().to_string();
-        assert!(message.contains("Old Card") && message.contains("multiview"), "{message}");
+        assert!(message.contains("Old Card") && message.contains("synchronization2"), "{message}");
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub struct Recorder {
     pub(crate) name: String,
     pub(crate) cmd: vk::CommandBuffer,
     /// State at this point of the recording.
-    hazards: Hazards,
+    pub(crate) hazards: Hazards,
     keep: Vec<Keep>,
     stages: Stages,
     counts: Counts,
@@ -100,9 +100,10 @@ impl Gpu {
 
 impl Recorder {
     /// Gives up an image's content and moves it to the GENERAL layout, in which it stays; once before its first use. It waits for
-    /// all that was recorded before, and all that follows waits for it. An image of another device is left alone; its uses are refused.
+    /// all that was recorded before, and all that follows waits for it. An image of another device, or of a host, is left alone; its uses
+    /// are refused.
     pub fn discard(&mut self, image: &Image) {
-        if !Arc::ptr_eq(&image.0.gpu, &self.gpu) {
+        if !Arc::ptr_eq(&image.0.gpu, &self.gpu) || image.0.host.is_some() {
             return;
         }
         use vk::{AccessFlags2 as A, PipelineStageFlags2 as S};

@@ -1,7 +1,7 @@
 //! A host with its own Vulkan: its device is used, its command buffer recorded into, and its handles survive.
 
 use crate::host::Host;
-use cao::renderer::Renderer;
+use cao::renderer::{Renderer, Target, Targets};
 use cao_gpu::Access::*;
 use cao_gpu::Error;
 use cao_gpu::{BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase, Stage, ValidationLog};
@@ -117,7 +117,14 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
         rec.discard(&colour);
         rec.discard(&depth);
         rec.barrier(&[], &[AttachmentWrite]);
-        hosted.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, [16, 16]).unwrap();
+        hosted
+            .record_draw(
+                &mut rec,
+                &views,
+                &Look::default(),
+                &Targets::new(&Target::layers(&colour, &depth, views.len()), [16, 16]),
+            )
+            .unwrap();
         let recorded = rec.finish().unwrap();
         host.submit_and_wait(&[cmd]);
         let stages = recorded.timings().unwrap().expect("the host has waited");

@@ -96,6 +96,31 @@ impl Host {
         unsafe { Gpu::adopt(adopted) }.unwrap()
     }
 
+    /// Its device.
+    pub fn device(&self) -> &ash::Device {
+        &self.device
+    }
+
+    /// Memory for an image or buffer of its own, mappable and coherent if asked.
+    pub fn memory(&self, needs: vk::MemoryRequirements, mapped: bool) -> vk::DeviceMemory {
+        let wanted = match mapped {
+            true => vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT,
+            false => vk::MemoryPropertyFlags::DEVICE_LOCAL,
+        };
+        // SAFETY: the calls follow Vulkan's rules.
+        unsafe {
+            let types = self.instance.get_physical_device_memory_properties(self.physical);
+            let fits = |i: &u32| {
+                needs.memory_type_bits >> i & 1 == 1
+                    && types.memory_types[*i as usize].property_flags.contains(wanted)
+            };
+            let kind = (0..types.memory_type_count).find(fits).unwrap();
+            let allocate =
+                vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind);
+            self.device.allocate_memory(&allocate, None).unwrap()
+        }
+    }
+
     /// A command buffer that is recording.
     pub fn begin(&self) -> vk::CommandBuffer {
         let allocate =

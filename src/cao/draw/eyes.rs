@@ -79,13 +79,14 @@ impl FrameBuffer {
         for (eye, view) in data.eye.iter_mut().zip(views) {
             view.check()?;
             let (origin, base) = view.ray(Vec2::ZERO);
-            let (n, f) = (view.near_mm, view.far_mm);
+            let [a, b] = view.depth_terms();
             *eye = Eye {
                 origin: origin.extend(1.0).to_array(),
                 base: base.extend(0.0).to_array(),
                 along_u: (view.ray(Vec2::X).1 - base).extend(0.0).to_array(),
                 along_v: (view.ray(Vec2::Y).1 - base).extend(0.0).to_array(),
-                depth: [f / (f - n), -f * n / (f - n), n, f],
+                // No device has to know infinity.
+                depth: [a, b, view.near_mm, view.far_mm.min(f32::MAX)],
                 view_projection: view.view_projection().to_cols_array_2d(),
             };
         }
