@@ -348,10 +348,3 @@ impl Drop for SamplerInner {
         unsafe { self.gpu.device.destroy_sampler(self.raw, None) };
     }
 }
-
-impl Image {
-    /// Interim.
-    pub fn raw(&self) -> vk::Image {
-        self.0.raw
-    }
-}

@@ -20,7 +20,7 @@ pub struct Eye {
     pub size: [u32; 2],
     /// Premultiplied sRGB and opacity, rows from the top.
     pub colours: Vec<[u8; 4]>,
-    /// 0 near … 1 far, as many.
+    /// By the view's planes, as many.
     pub depths: Vec<f32>,
 }
 
@@ -59,9 +59,9 @@ impl Verdict {
     const POINTS: usize = 500;
     /// Least share of equally lit points. Not all are: where the picture has detail finer than a pixel, four pixels do not span what lies
     /// between them.
-    const EQUAL: f64 = 0.97;
+    const EQUAL: f64 = 0.95;
     /// The control must fall short by so much: else the picture could not show a difference.
-    const BELOW: f64 = 0.1;
+    const BELOW: f64 = 0.2;
 
     /// Most that the rehearsed clip leaves of what is covered: its hand reaches through the volume. The head moves a little between two
     /// frames, and with it what is covered.
@@ -169,13 +169,13 @@ impl Eye {
     }
 
     fn opaque(&self, i: usize) -> bool {
-        self.colours[i][3] == u8::MAX && self.depths[i] < 1.0
+        self.colours[i][3] == u8::MAX && self.depths[i] != self.view.depth_of_nothing()
     }
 
     /// Distance along the view axis in mm at a depth.
     fn distance(&self, depth: f32) -> f32 {
-        let (n, f) = (self.view.near_mm, self.view.far_mm);
-        n * f / (f - depth * (f - n))
+        let [a, b] = self.view.depth_terms();
+        b / (depth - a)
     }
 
     /// The point in mm that a pixel shows.
@@ -230,6 +230,7 @@ mod tests {
             tan: Tangents { left: -0.4, right: 0.4, up: 0.35, down: -0.35 },
             near_mm: 10.0,
             far_mm: 1000.0,
+            reversed: false,
         };
         let mut eye = Eye { view, size: SIZE, colours: Vec::new(), depths: Vec::new() };
         for i in 0..SIZE[0] * SIZE[1] {

@@ -49,8 +49,8 @@ impl Button {
     }
 }
 
-/// Frames in which the rehearsed hand makes the clip larger, e² times: from a hand at rest it reaches into what is before the head.
-const GROWING: u64 = 40;
+/// Frames in which the rehearsed hand makes the clip larger, eight times: from a hand at rest it reaches into what is before the head.
+const GROWING: u64 = 42;
 /// Frames in which it pulls the trigger.
 const PULLS: [u64; 2] = [60, 80];
 
@@ -275,7 +275,7 @@ mod tests {
         }
         let clip = c.clip().unwrap();
         assert_eq!(clip.shape.name(), "cylinder");
-        assert!((clip.pose.scale.x - 50.0 * 2.0_f32.exp()).abs() < 1.0, "{:?}", clip.pose);
+        assert!((clip.pose.scale.x - 50.0 * 2.1_f32.exp()).abs() < 1.0, "{:?}", clip.pose);
     }
 
     #[test]

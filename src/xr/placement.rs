@@ -87,7 +87,14 @@ impl Placement {
     /// The eye with this pose and field of view, for the renderer. Depths are those of [`NEAR_M`] and [`FAR_M`].
     pub fn view(&self, eye: Rigid, tan: Tangents) -> View {
         let (position, orientation) = self.to_volume(eye);
-        View { position, orientation, tan, near_mm: NEAR_M / self.metres, far_mm: FAR_M / self.metres }
+        View {
+            position,
+            orientation,
+            tan,
+            near_mm: NEAR_M / self.metres,
+            far_mm: FAR_M / self.metres,
+            reversed: false,
+        }
     }
 
     /// Larger by a factor, in bounds, around a point of the room that stays where it is in the volume.

@@ -7,13 +7,13 @@ use crate::input::{Input, located, rigid};
 use crate::placement::{Placement, Rigid};
 use crate::readback::ReadBack;
 use crate::runtime::{Runtime, VIEWS};
-use crate::target::Targets;
+use crate::target::{self, Images, Targets};
 use anyhow::{Context, Result};
 use ash::vk;
-use cao::gpu::{Format, Gpu, Phase, Recorded};
+use cao::gpu::{Gpu, Phase, Recorded};
 use cao::model::frame::Turn;
 use cao::model::view::Tangents;
-use cao::renderer::Drawn;
+use cao::renderer::{self as draw, Drawn};
 use cao::{Look, Renderer, Setup, TransferFunction, View, Volume};
 use openxr as xr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -123,6 +123,8 @@ impl Drop for Slots<'_> {
 
 /// What frames share.
 struct Frames<'a> {
+    /// First, and so dropped first: it waits for what runs.
+    slots: Slots<'a>,
     runtime: &'a Runtime,
     device: &'a Device,
     gpu: &'a Gpu,
@@ -138,7 +140,6 @@ struct Frames<'a> {
     room: xr::Space,
     head: xr::Space,
     blend: xr::EnvironmentBlendMode,
-    slots: Slots<'a>,
     /// From the first frame in which the head was seen.
     controls: Option<Controls>,
     /// The eyes where they were last seen.
@@ -156,7 +157,7 @@ pub fn run(runtime: &Runtime, device: &Device, show: &Show, plan: &Plan<'_>) -> 
     // used by this thread alone, also by the runtime, within its calls.
     let gpu = unsafe { Gpu::adopt(device.lend()) }?;
     let mut renderer =
-        Renderer::new(&gpu, &show.volume, show.transfer.clone(), show.setup, Format::Rgba16Float)?;
+        Renderer::new(&gpu, &show.volume, show.transfer.clone(), show.setup, target::COLOUR.format)?;
     // Before there is a session: nobody waits for a frame yet.
     renderer.update(&mut |_| ())?;
     // SAFETY: instance and device were made through this runtime and outlive the session, which is dropped here.
@@ -169,7 +170,7 @@ pub fn run(runtime: &Runtime, device: &Device, show: &Show, plan: &Plan<'_>) -> 
     };
     let space = |kind| session.create_reference_space(kind, xr::Posef::IDENTITY);
     let (room, head) = (space(room)?, space(xr::ReferenceSpaceType::VIEW)?);
-    let targets = Targets::new(runtime, &session, device, &gpu)?;
+    let targets = Targets::new(runtime, &session, &gpu)?;
     let report = Report { size: targets.size, depth: targets.has_depth(), ..Report::default() };
     let mut frames = Frames {
         input: Input::new(&session)?,
@@ -193,9 +194,7 @@ pub fn run(runtime: &Runtime, device: &Device, show: &Show, plan: &Plan<'_>) -> 
         report,
     };
     frames.all()?;
-    let Frames { slots, report, .. } = frames;
-    drop(slots);
-    Ok(report)
+    Ok(std::mem::take(&mut frames.report))
 }
 
 impl<'a> Frames<'a> {
@@ -274,15 +273,20 @@ impl<'a> Frames<'a> {
         // A frame later than this is shown late; what is checked has to be all there.
         let budget_ms = (!self.plan.check).then_some((period * SHARE) as f32);
         let look = Look { budget_ms, ..self.show.look };
-        self.targets.prepare(&mut rec);
-        let [colour, depth] = self.targets.own();
-        let drawn = self.renderer.record_draw(&mut rec, &views, &look, colour, depth, self.targets.size)?;
+        let images = self.targets.images();
+        for image in images.all() {
+            rec.acquire(image)?;
+        }
+        let targets = images.targets();
+        let targets = draw::Targets::new(&targets, self.targets.size);
+        let drawn = self.renderer.record_draw(&mut rec, &views, &look, &targets)?;
+        for image in images.all() {
+            rec.release(image)?;
+        }
         let recorded = rec.finish()?;
-        // SAFETY: interim.
-        unsafe { self.targets.copy(cmd) };
         let last = self.plan.frames == Some(self.report.frames + 1);
         let reads = self.plan.check && (self.report.frames == 0 || last);
-        let read = reads.then(|| self.read(cmd)).transpose()?;
+        let read = reads.then(|| self.read(cmd, &images)).transpose()?;
         // SAFETY: the command buffer is recording and of this device, and the fence is not in use.
         unsafe {
             self.device.raw.end_command_buffer(cmd)?;
@@ -355,16 +359,15 @@ impl<'a> Frames<'a> {
     }
 
     /// Records copies of the images of this frame to where the processor reads them: colours, depths.
-    fn read(&self, cmd: vk::CommandBuffer) -> Result<[ReadBack<'a>; 2]> {
+    fn read(&self, cmd: vk::CommandBuffer, images: &Images<'_>) -> Result<[ReadBack<'a>; 2]> {
         use vk::{ImageAspectFlags as Aspect, ImageLayout as Layout};
-        let (colour, depth) = self.targets.current();
-        let depth = depth.context("the check needs depths, and this runtime takes none")?;
+        let depth = images.depth.context("the check needs depths, and this runtime takes none")?;
         let copies =
             [ReadBack::new(self.device, self.targets.size)?, ReadBack::new(self.device, self.targets.size)?];
         // SAFETY: the images are ours until they are released, in the layouts in which the runtime takes them back; the caller waits.
         unsafe {
-            copies[0].record(cmd, colour, Aspect::COLOR, Layout::COLOR_ATTACHMENT_OPTIMAL);
-            copies[1].record(cmd, depth, Aspect::DEPTH, Layout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
+            copies[0].record(cmd, images.colour.raw(), Aspect::COLOR, Layout::COLOR_ATTACHMENT_OPTIMAL);
+            copies[1].record(cmd, depth.raw(), Aspect::DEPTH, Layout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
         }
         Ok(copies)
     }

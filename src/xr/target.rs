@@ -1,51 +1,109 @@
 //! The runtime's images, which its compositor shows: colour, and depth where it takes that; a layer an eye.
 
-use crate::device::Device;
 use crate::placement::{FAR_M, NEAR_M};
 use crate::readback::LAYERS;
 use crate::runtime::{Runtime, VIEWS};
 use anyhow::{Context, Result, bail};
 use ash::vk::{self, Handle};
-use cao::gpu::{Access, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
+use cao::gpu::{Format, Gpu, Image, ImageState, ImageUse, Lent};
+use cao::renderer::{Place, Target};
 use openxr as xr;
 
-/// A swapchain and its images.
+/// A swapchain and its images, which `cao` borrows.
 struct Chain {
+    /// Before the swapchain, and so dropped before it: views of images that are its own.
+    images: Vec<Image>,
     handle: xr::Swapchain<xr::Vulkan>,
-    images: Vec<vk::Image>,
     /// The one that is ours until it is released.
     current: usize,
 }
 
 impl Chain {
-    fn new(
-        session: &xr::Session<xr::Vulkan>,
-        format: vk::Format,
-        usage: xr::SwapchainUsageFlags,
-        [width, height]: [u32; 2],
-    ) -> Result<Self> {
+    fn new(session: &xr::Session<xr::Vulkan>, gpu: &Gpu, kind: &Kind, size: [u32; 2]) -> Result<Self> {
         let handle = session.create_swapchain(&xr::SwapchainCreateInfo {
             create_flags: xr::SwapchainCreateFlags::EMPTY,
-            usage_flags: usage
-                | xr::SwapchainUsageFlags::TRANSFER_SRC
-                | xr::SwapchainUsageFlags::TRANSFER_DST,
-            format: format.as_raw() as u32,
+            // To be drawn to, and for the check to be read.
+            usage_flags: kind.usage | xr::SwapchainUsageFlags::TRANSFER_SRC,
+            format: kind.vulkan.as_raw() as u32,
             sample_count: 1,
-            width,
-            height,
+            width: size[0],
+            height: size[1],
             face_count: 1,
             array_size: LAYERS,
             mip_count: 1,
         })?;
-        let images = handle.enumerate_images()?.into_iter().map(vk::Image::from_raw).collect();
-        Ok(Self { handle, images, current: 0 })
+        let lend = |image| {
+            let lent = Lent {
+                image: vk::Image::from_raw(image),
+                size,
+                layers: LAYERS,
+                format: kind.format,
+                usage: ImageUse::ATTACHMENT,
+                // All of it is drawn anew.
+                before: ImageState { layout: vk::ImageLayout::UNDEFINED, ..kind.state },
+                after: kind.state,
+            };
+            // SAFETY: an image of the swapchain just made, on this device, as asked for above; it lives as long as the swapchain, which
+            // is dropped after `images` and after what was recorded. It is used only while it is acquired.
+            unsafe { gpu.adopt_image(kind.name, &lent) }
+        };
+        let images = handle.enumerate_images()?.into_iter().map(lend).collect::<Result<_, _>>()?;
+        Ok(Self { images, handle, current: 0 })
     }
 
-    /// Takes the next image, and waits until the compositor no longer reads it.
-    fn acquire(&mut self) -> Result<vk::Image> {
+    fn acquire(&mut self) -> Result<()> {
         self.current = self.handle.acquire_image()? as usize;
-        self.handle.wait_image(xr::Duration::INFINITE)?;
-        Ok(self.images[self.current])
+        Ok(self.handle.wait_image(xr::Duration::INFINITE)?)
+    }
+
+    fn current(&self) -> &Image {
+        &self.images[self.current]
+    }
+}
+
+/// What a swapchain holds.
+pub(crate) struct Kind {
+    name: &'static str,
+    vulkan: vk::Format,
+    pub format: Format,
+    usage: xr::SwapchainUsageFlags,
+    /// In which the runtime wants its images back.
+    state: ImageState,
+}
+
+/// Light, coded by the format as compositors decode it.
+pub(crate) const COLOUR: Kind = Kind {
+    name: "colour of the headset",
+    vulkan: vk::Format::R8G8B8A8_SRGB,
+    format: Format::Rgba8Srgb,
+    usage: xr::SwapchainUsageFlags::COLOR_ATTACHMENT,
+    state: ImageState::COLOUR_ATTACHMENT,
+};
+const DEPTH: Kind = Kind {
+    name: "depth of the headset",
+    vulkan: vk::Format::D32_SFLOAT,
+    format: Format::D32Float,
+    usage: xr::SwapchainUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+    state: ImageState::DEPTH_ATTACHMENT,
+};
+
+/// The images of a frame.
+pub(crate) struct Images<'a> {
+    pub colour: &'a Image,
+    pub depth: Option<&'a Image>,
+}
+
+impl<'a> Images<'a> {
+    pub fn all(&self) -> impl Iterator<Item = &'a Image> + use<'a> {
+        [self.colour].into_iter().chain(self.depth)
+    }
+
+    /// A layer an eye.
+    pub fn targets(&self) -> [Target<'a>; 2] {
+        [0, 1].map(|layer| {
+            let place = |image| Place { image, layer, at: [0; 2] };
+            Target { colour: place(self.colour), depth: self.depth.map(place), scene: None }
+        })
     }
 }
 
@@ -55,25 +113,14 @@ pub struct Targets {
     depth: Option<Chain>,
     /// Pixels of an eye.
     pub size: [u32; 2],
-    own: [Image; 2],
-    device: ash::Device,
 }
-
-/// Whose colours the compositor takes as they are: it decodes sRGB by itself.
-const COLOUR: vk::Format = vk::Format::R8G8B8A8_SRGB;
-const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
 impl Targets {
     /// As large as the runtime recommends.
     ///
     /// # Errors
     /// Eyes of different sizes, no sRGB; the runtime's.
-    pub fn new(
-        runtime: &Runtime,
-        session: &xr::Session<xr::Vulkan>,
-        device: &Device,
-        gpu: &Gpu,
-    ) -> Result<Self> {
+    pub fn new(runtime: &Runtime, session: &xr::Session<xr::Vulkan>, gpu: &Gpu) -> Result<Self> {
         let views = runtime.instance.enumerate_view_configuration_views(runtime.system, VIEWS)?;
         let sizes: Vec<_> = views
             .iter()
@@ -84,21 +131,14 @@ impl Targets {
         };
         let size = [left[0].max(right[0]), left[1].max(right[1])];
         let formats = session.enumerate_swapchain_formats()?;
-        let offered = |format: vk::Format| formats.contains(&(format.as_raw() as u32));
-        if !offered(COLOUR) {
-            bail!("the runtime shows no images of {COLOUR:?}, which this program draws");
+        let offered = |kind: &Kind| formats.contains(&(kind.vulkan.as_raw() as u32));
+        if !offered(&COLOUR) {
+            bail!("the runtime shows no images of {:?}, which this program draws", COLOUR.vulkan);
         }
-        let colour = Chain::new(session, COLOUR, xr::SwapchainUsageFlags::COLOR_ATTACHMENT, size)?;
-        let with_depth = runtime.depth && offered(DEPTH);
-        let depth = with_depth
-            .then(|| Chain::new(session, DEPTH, xr::SwapchainUsageFlags::DEPTH_STENCIL_ATTACHMENT, size))
-            .transpose()?;
-        let own = |format| {
-            let (kind, usage) = (ImageKind::D2, ImageUse::ATTACHMENT);
-            gpu.image("own", &ImageDesc { dims: [size[0], size[1], 1], layers: 2, format, kind, usage })
-        };
-        let own = [own(Format::Rgba16Float)?, own(Format::D32Float)?];
-        Ok(Self { colour, depth, size, own, device: device.raw.clone() })
+        let colour = Chain::new(session, gpu, &COLOUR, size)?;
+        let depth = runtime.depth && offered(&DEPTH);
+        let depth = depth.then(|| Chain::new(session, gpu, &DEPTH, size)).transpose()?;
+        Ok(Self { colour, depth, size })
     }
 
     /// Whether the compositor takes depth.
@@ -106,89 +146,16 @@ impl Targets {
         self.depth.is_some()
     }
 
+    /// Takes the images of the next frame, and waits until the compositor no longer reads them.
     pub(crate) fn acquire(&mut self) -> Result<()> {
         self.colour.acquire()?;
         self.depth.as_mut().map(Chain::acquire).transpose()?;
         Ok(())
     }
 
-    pub(crate) fn own(&self) -> [&Image; 2] {
-        [&self.own[0], &self.own[1]]
-    }
-
-    /// The images of this frame: colour, depth.
-    pub(crate) fn current(&self) -> (vk::Image, Option<vk::Image>) {
-        (self.colour.images[self.colour.current], self.depth.as_ref().map(|d| d.images[d.current]))
-    }
-
-    pub(crate) fn prepare(&self, rec: &mut Recorder) {
-        rec.discard(&self.own[0]);
-        rec.discard(&self.own[1]);
-        rec.barrier(&[], &[Access::AttachmentWrite]);
-    }
-
-    /// Interim: blits.
-    pub(crate) unsafe fn copy(&self, cmd: vk::CommandBuffer) {
-        use vk::{AccessFlags2 as A, ImageAspectFlags as I, ImageLayout as L, PipelineStageFlags2 as S};
-        let (colour, depth) = self.current();
-        let turn = |image, aspect, from: L, to: L| {
-            vk::ImageMemoryBarrier2::default()
-                .src_stage_mask(S::ALL_COMMANDS)
-                .src_access_mask(A::MEMORY_WRITE)
-                .dst_stage_mask(S::ALL_COMMANDS)
-                .dst_access_mask(A::MEMORY_READ | A::MEMORY_WRITE)
-                .old_layout(from)
-                .new_layout(to)
-                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .image(image)
-                .subresource_range(
-                    vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(2),
-                )
-        };
-        let mut before = vec![turn(colour, I::COLOR, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL)];
-        let mut after = vec![turn(colour, I::COLOR, L::TRANSFER_DST_OPTIMAL, L::COLOR_ATTACHMENT_OPTIMAL)];
-        if let Some(depth) = depth {
-            before.push(turn(depth, I::DEPTH, L::UNDEFINED, L::TRANSFER_DST_OPTIMAL));
-            after.push(turn(depth, I::DEPTH, L::TRANSFER_DST_OPTIMAL, L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL));
-        }
-        let all = [vk::MemoryBarrier2::default()
-            .src_stage_mask(S::ALL_COMMANDS)
-            .src_access_mask(A::MEMORY_WRITE)
-            .dst_stage_mask(S::ALL_COMMANDS)
-            .dst_access_mask(A::MEMORY_READ | A::MEMORY_WRITE)];
-        let end = vk::Offset3D { x: self.size[0] as i32, y: self.size[1] as i32, z: 1 };
-        let layers = |aspect| vk::ImageSubresourceLayers::default().aspect_mask(aspect).layer_count(2);
-        let corners = [vk::Offset3D::default(), end];
-        let blit = |aspect| vk::ImageBlit {
-            src_subresource: layers(aspect),
-            src_offsets: corners,
-            dst_subresource: layers(aspect),
-            dst_offsets: corners,
-        };
-        unsafe {
-            self.device.cmd_pipeline_barrier2(
-                cmd,
-                &vk::DependencyInfo::default().image_memory_barriers(&before).memory_barriers(&all),
-            );
-            let blit = |from: &Image, to, aspect| {
-                self.device.cmd_blit_image(
-                    cmd,
-                    from.raw(),
-                    L::GENERAL,
-                    to,
-                    L::TRANSFER_DST_OPTIMAL,
-                    &[blit(aspect)],
-                    vk::Filter::NEAREST,
-                );
-            };
-            blit(&self.own[0], colour, I::COLOR);
-            if let Some(depth) = depth {
-                blit(&self.own[1], depth, I::DEPTH);
-            }
-            self.device
-                .cmd_pipeline_barrier2(cmd, &vk::DependencyInfo::default().image_memory_barriers(&after));
-        }
+    /// Them.
+    pub(crate) fn images(&self) -> Images<'_> {
+        Images { colour: self.colour.current(), depth: self.depth.as_ref().map(Chain::current) }
     }
 
     pub(crate) fn release(&mut self) -> Result<()> {
@@ -213,7 +180,6 @@ impl Targets {
             extent: xr::Extent2Di { width: self.size[0] as i32, height: self.size[1] as i32 },
         };
         let part = |chain: &Chain, eye: u32| {
-            // SAFETY: a builder's call.
             xr::SwapchainSubImage::new()
                 .swapchain(&chain.handle)
                 .image_array_index(eye)
