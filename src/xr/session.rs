@@ -251,10 +251,10 @@ impl<'a> Frames<'a> {
         if self.eyes.is_none() {
             self.eyes = self.located(time)?;
         }
-        let (true, Some(_)) = (frame.should_render && !leaving, self.eyes) else {
+        let (true, Some(eyes)) = (frame.should_render && !leaving, self.eyes) else {
             return Ok(self.stream.end(time, self.blend, &[])?);
         };
-        self.hands(time)?;
+        let placement = self.hands(time)?;
         let slot = self.report.frames as usize % AHEAD;
         let (cmd, fence) = self.free(slot)?;
         // SAFETY: the command buffer is recording and submitted once below; the recording is kept in its slot until the fence says that it
@@ -264,11 +264,9 @@ impl<'a> Frames<'a> {
         self.renderer.record_update(&mut rec)?;
         self.targets.acquire()?;
         // As late as can be: all that follows needs them.
-        if let Some(eyes) = self.located(time)? {
-            self.eyes = Some(eyes);
-        }
-        let (Some(eyes), Some(controls)) = (self.eyes, &self.controls) else { unreachable!("seen above") };
-        let views = eyes.map(|eye| controls.placement.view(rigid(eye.pose), tangents(eye.fov)));
+        let eyes = self.located(time)?.unwrap_or(eyes);
+        self.eyes = Some(eyes);
+        let views = eyes.map(|eye| placement.view(rigid(eye.pose), tangents(eye.fov)));
         let period = frame.predicted_display_period.as_nanos() as f64 * 1e-6;
         // A frame later than this is shown late; what is checked has to be all there.
         let budget_ms = (!self.plan.check).then_some((period * SHARE) as f32);
@@ -312,25 +310,25 @@ impl<'a> Frames<'a> {
         Ok(<[xr::View; 2]>::try_from(views).ok().filter(|_| flags.contains(known)))
     }
 
-    /// What hands do until a time; the volume stands before the head at first.
-    fn hands(&mut self, time: xr::Time) -> Result<()> {
-        let size_mm = self.show.volume.size_mm();
-        if self.controls.is_none() {
-            let head = located(&self.head.locate(&self.room, time)?).unwrap_or(Rigid::IDENTITY);
-            let placement = Placement::in_front_of(head, size_mm, self.show.turn);
-            self.controls = Some(Controls::new(placement, size_mm));
-        }
+    /// What hands do until a time, and where the volume stands then: before the head at first.
+    fn hands(&mut self, time: xr::Time) -> Result<Placement> {
+        let head = located(&self.head.locate(&self.room, time)?).unwrap_or(Rigid::IDENTITY);
         let mut hands = self.input.read(&self.session, &self.room, time)?;
         let mut seconds = self.last.map_or(0.0, |last| (time.as_nanos() - last.as_nanos()) as f32 * 1e-9);
         self.last = Some(time);
-        let Some(controls) = &mut self.controls else { return Ok(()) };
+        let show = self.show;
+        let controls = self.controls.get_or_insert_with(|| {
+            let size_mm = show.volume.size_mm();
+            Controls::new(Placement::in_front_of(head, size_mm, show.turn), size_mm)
+        });
         if self.plan.check {
             (hands, seconds) = (rehearsed(hands, self.report.frames), REHEARSED_S);
         }
         controls.step(&hands, seconds);
         let clip = controls.clip();
         self.report.clipped += u64::from(clip.is_some());
-        Ok(self.renderer.set_clips(clip.as_slice())?)
+        self.renderer.set_clips(clip.as_slice())?;
+        Ok(controls.placement)
     }
 
     /// A slot whose commands have run, recording anew.

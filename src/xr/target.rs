@@ -116,10 +116,10 @@ pub struct Targets {
 }
 
 impl Targets {
-    /// As large as the runtime recommends.
+    /// As large as the runtime recommends for the larger eye.
     ///
     /// # Errors
-    /// Eyes of different sizes, no sRGB; the runtime's.
+    /// Not two views, no sRGB; the runtime's.
     pub fn new(runtime: &Runtime, session: &xr::Session<xr::Vulkan>, gpu: &Gpu) -> Result<Self> {
         let views = runtime.instance.enumerate_view_configuration_views(runtime.system, VIEWS)?;
         let sizes: Vec<_> = views
@@ -153,7 +153,7 @@ impl Targets {
         Ok(())
     }
 
-    /// Them.
+    /// Those that were acquired.
     pub(crate) fn images(&self) -> Images<'_> {
         Images { colour: self.colour.current(), depth: self.depth.as_ref().map(Chain::current) }
     }
