@@ -57,6 +57,7 @@ impl Device {
             physical_device: self.physical,
             device: self.raw.clone(),
             queue_family: self.family,
+            compute_only: false,
             queue: Some(self.queue),
         }
     }
@@ -183,9 +184,10 @@ fn open(
             (&raw const create).cast(),
         )
     };
-    let raw = made?
-        .map_err(|code| vulkan("vkCreateDevice", code))
-        .with_context(|| "the headset's device lacks something that cao needs; `cao devices` says what")?;
+    let raw = made?.map_err(|code| vulkan("vkCreateDevice", code)).with_context(|| {
+        let needed = Gpu::required().join("; ");
+        format!("the headset's device lacks something that cao needs ({needed}); `cao devices` says what")
+    })?;
     // SAFETY: the runtime made it of this instance.
     let raw = unsafe { ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(raw as u64)) };
     Ok((physical, raw, family))
