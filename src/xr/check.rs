@@ -4,7 +4,7 @@
 //!
 //! A pixel of the left eye shows a point of the volume: pixel's ray and depth say where it is. Projected into the right eye that point
 //! lies between four pixels. Where their depths say that they show the same surface, nothing hides the point there, and its colour must be
-//! one that these four span, to [`LEVELS`]: the right eye shows it nowhere else, only points around it.
+//! one that these four span, to two levels of 255: the right eye shows it nowhere else, only points around it.
 
 #![forbid(unsafe_code)]
 
