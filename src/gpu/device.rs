@@ -8,7 +8,7 @@ use super::{
     idle::Idle,
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
-    validation::{LAYER, ValidationLog},
+    validation::ValidationLog,
 };
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
@@ -139,12 +139,12 @@ impl Instance {
         let mut messenger;
         let mut create = vk::InstanceCreateInfo::default().application_info(&application);
         if let Some(log) = validation {
-            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER)) {
+            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(ValidationLog::LAYER)) {
                 return Err(Error::Device {
                     problem: "validation was asked for, but its layer is missing; install it, on Debian or Ubuntu `apt install vulkan-validationlayers`".into(),
                 });
             }
-            layer_names.push(LAYER.as_ptr());
+            layer_names.push(ValidationLog::LAYER.as_ptr());
             names.push(vk::EXT_VALIDATION_FEATURES_NAME.as_ptr());
             messenger = log.messenger();
             create = create.push_next(&mut features).push_next(&mut messenger);
