@@ -83,6 +83,12 @@ const CRATES: &[Crate] = &[
     ),
     // For hosts that use wgpu; a workspace of its own.
     uses("src/wgpu", "cao-wgpu", &["cao"], &["thiserror", "wgpu"]),
+    uses(
+        "src/xr",
+        "cao-xr",
+        &["cao", "cao-cli", "cao-formats"],
+        &["anyhow", "ash", "clap", "glam", "openxr", "signal-hook"],
+    ),
     // For tests and benches.
     uses(
         "tests/support",
@@ -103,7 +109,11 @@ const CRATES: &[Crate] = &[
 ];
 
 /// Crates that hold unsafe code. All others forbid it.
-const UNSAFE_IN: [&str; 2] = ["src/gpu", "src/wgpu"];
+const UNSAFE_IN: [&str; 3] = ["src/gpu", "src/wgpu", "src/xr"];
+
+/// Files of those crates that need none, and forbid it too.
+const SAFE_THERE: [&str; 5] =
+    ["src/xr/check.rs", "src/xr/controls.rs", "src/xr/input.rs", "src/xr/main.rs", "src/xr/placement.rs"];
 
 /// Crates that deny it but for one promise, `Shader::new`, and the files that make it: what the build emits for each kernel, and what
 /// hands the device the kernels of tests.
@@ -113,7 +123,7 @@ const PROMISED_BY: [&str; 3] =
     ["spirv/compile/emit/shader.rs", "spirv/compile/tests/kernels/emitted.rs", "tests/support/wgsl.rs"];
 
 /// Crates whose libraries may print: the programs' own, and what cargo runs for us, at builds too.
-const LOUD: [&str; 3] = ["src/cli", "benches", "spirv/compile"];
+const LOUD: [&str; 4] = ["src/cli", "src/xr", "benches", "spirv/compile"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -331,8 +341,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
 ];
 
 /// Crates of one floor: their modules may name each other.
-const ONE_FLOOR: [&str; 7] =
-    ["src/gpu/", "src/twin/", "src/cli/", "src/wgpu/", "spirv/", "benches/", "tests/support/"];
+const ONE_FLOOR: [&str; 8] =
+    ["src/gpu/", "src/twin/", "src/cli/", "src/wgpu/", "src/xr/", "spirv/", "benches/", "tests/support/"];
 
 /// Names at a crate's root that are not modules, and the module that they come from. The longest path that fits counts.
 const ROOT_NAMES: [(&str, &str, &str); 7] = [
@@ -346,9 +356,10 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 15] = [
-    ("ash", &["src/gpu/", "src/wgpu/"]),
+const ONLY_IN: [(&str, &[&str]); 16] = [
+    ("ash", &["src/gpu/", "src/wgpu/", "src/xr/"]),
     ("wgpu", &["src/wgpu/"]),
+    ("openxr", &["src/xr/"]),
     ("gpu_allocator", &["src/gpu/"]),
     ("tobj", &["src/formats/obj.rs"]),
     ("earcut", &["src/formats/polygon.rs"]),
@@ -357,8 +368,8 @@ const ONLY_IN: [(&str, &[&str]); 15] = [
     ("jpegls", &["src/formats/dicom/pixels.rs"]),
     ("hayro_jpeg2000", &["src/formats/dicom/pixels.rs"]),
     ("kuva", &["src/measure/plot.rs"]),
-    ("clap", &["src/cli/"]),
-    ("anyhow", &["src/cli/"]),
+    ("clap", &["src/cli/", "src/xr/"]),
+    ("anyhow", &["src/cli/", "src/xr/"]),
     ("indicatif", &["src/cli/"]),
     // On the device there is one place that knows a volume: it copies it there.
     ("cao_model::volume", VOLUME_IN),
@@ -665,7 +676,10 @@ fn every_file_of_tests_belongs_to_an_executable() {
     // Cargo finds no test by itself here, and is told of each.
     let targets = |manifest: &str| toml(manifest)["test"].as_array().unwrap().len();
     let mains = files.keys().filter(|file| file.ends_with("/main.rs")).count();
-    assert_eq!(targets("Cargo.toml") + targets("src/cli/Cargo.toml"), mains);
+    assert_eq!(
+        ["Cargo.toml", "src/cli/Cargo.toml", "src/xr/Cargo.toml"].map(targets).iter().sum::<usize>(),
+        mains
+    );
 
     let planted = |main: &str| {
         BTreeMap::from([
@@ -767,6 +781,9 @@ fn unsafe_is_only_where_vulkan_is_and_says_why_it_is_sound() {
             seen += 1;
         }
     }
+    for file in SAFE_THERE {
+        assert!(forbids_unsafe(&files[file]), "{file} does not forbid unsafe code");
+    }
     assert!(seen > CRATES.len(), "programs, benches and build scripts have roots of their own");
     assert!(UNSAFE_IN.iter().all(|folder| CRATES.iter().any(|c| c.folder == *folder)));
 
@@ -847,7 +864,7 @@ fn past_the_door(file: &str, text: &str) -> Vec<String> {
 
 #[test]
 fn files_are_opened_in_one_place() {
-    let files = sources(&["src/formats", "src/measure", "src/cli"]);
+    let files = sources(&["src/formats", "src/measure", "src/cli", "src/xr"]);
     let wrong: Vec<String> = files.iter().flat_map(|(file, text)| past_the_door(file, text)).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     for (call, places) in FILES_IN {

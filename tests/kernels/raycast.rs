@@ -433,7 +433,7 @@ fn views_that_do_not_fit_are_refused_by_name() {
         record(views, layers).unwrap();
     }
     let few = record(&[left, right, left, right], 2).unwrap_err().to_string();
-    assert!(few.contains("needs 4 layers") && few.contains("has 2"), "{few}");
+    assert!(few.contains("view 2") && few.contains("layer 2") && few.contains("in 2 layers"), "{few}");
     assert!(record(&[left; 6], 6).unwrap_err().to_string().contains("views"));
     drop(renderer);
     close(gpu);

@@ -12,6 +12,7 @@ mod external;
 mod failures;
 mod fit;
 mod frames;
+mod guest;
 mod host;
 mod host_image;
 mod leaks;
