@@ -61,6 +61,7 @@
 #![forbid(unsafe_code)]
 
 pub mod ambient;
+pub mod build;
 pub mod cast;
 pub mod clip;
 pub mod draw;
@@ -89,6 +90,7 @@ pub use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
 pub use cao_model::transfer::TransferFunction;
 pub use cao_model::view::{StereoRig, View};
 pub use cao_model::volume::Volume;
+pub use build::{Budget, Stale, Updated};
 pub use error::{Error, Result};
 pub use gpu::{Gpu, OpenOptions};
 pub use renderer::Renderer;

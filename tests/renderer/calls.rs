@@ -2,6 +2,7 @@
 //! nothing to say, and works on as soon as it is told something sound. A run is short and always the same; CONTRIBUTING.md has the
 //! command for a long one.
 
+use cao::Budget;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::Gpu;
 use cao_model::builtin::builtin_box;
@@ -34,6 +35,7 @@ enum Call {
     Update,
     Record,
     RecordAndDrop,
+    Within(Budget, f64),
     Invalidate,
     Draw(StereoRig, Look, [u32; 2]),
     Read,
@@ -124,6 +126,11 @@ fn call() -> impl Strategy<Value = Call> {
     });
     let look = prop_oneof![Just(Look::default()), look];
     let size = select(vec![[0, 4], [1, 1], [9, 7], [16, 16], [u32::MAX, 1], [1, u32::MAX]]);
+    let budget = prop_oneof![
+        (0..9_u32).prop_map(Budget::Bricks),
+        Just(Budget::Bricks(u32::MAX)),
+        length().prop_map(Budget::Ms)
+    ];
     let place = prop::array::uniform3(prop_oneof![8 => 0..9_u32, 1 => Just(u32::MAX)]);
     prop_oneof![
         2 => transfer().prop_map(Call::Transfer),
@@ -134,6 +141,7 @@ fn call() -> impl Strategy<Value = Call> {
         4 => Just(Call::Update),
         1 => Just(Call::Record),
         1 => Just(Call::RecordAndDrop),
+        3 => (budget, any::<f64>()).prop_map(|(budget, ms)| Call::Within(budget, ms)),
         1 => Just(Call::Invalidate),
         3 => (rig, look, size).prop_map(|(rig, look, size)| Call::Draw(rig, look, size)),
         1 => Just(Call::Read),
@@ -182,6 +190,12 @@ fn act(
             let recorded = renderer.record_update(&mut gpu.recorder("calls")?);
             renderer.invalidate();
             recorded?;
+        }
+        Call::Within(budget, ms) => {
+            let mut rec = gpu.recorder("calls")?;
+            let updated = renderer.record_update_within(&mut rec, *budget)?;
+            rec.submit_and_wait()?;
+            renderer.updated(&updated, *ms)?;
         }
         Call::Invalidate => renderer.invalidate(),
         Call::Draw(rig, look, size) => drop(renderer.draw(&rig.views(1.0, 0.1, 100.0)?, look, *size)?),

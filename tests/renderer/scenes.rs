@@ -30,6 +30,7 @@ fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
 }
 
 /// A scene as an engine holds it, so that a renderer can be made for it anew.
+#[derive(Clone)]
 pub struct Scene {
     pub volume: Volume,
     pub transfer: TransferFunction,
