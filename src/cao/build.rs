@@ -182,10 +182,12 @@ impl Rates {
     pub fn learn(&mut self, updated: &Updated, bricks: u32, ms: f64) {
         let Some(stage) = updated.stage.filter(|_| ms.is_finite() && ms > 0.0) else { return };
         let bricks = f64::from(bricks);
-        if let (Some(changed), Some(brick_ms)) = (updated.opens, self.brick_ms(stage)) {
-            self.opening[kind(changed)].push((ms - bricks * brick_ms).max(0.0));
-        } else if bricks > 0.0 {
-            // An opening says something of bricks only where nothing else did.
+        let known = self.brick_ms(stage);
+        if let Some(changed) = updated.opens {
+            self.opening[kind(changed)].push((ms - bricks * known.unwrap_or(0.0)).max(0.0));
+        }
+        // An opening says something of bricks only where nothing else did.
+        if bricks > 0.0 && (updated.opens.is_none() || known.is_none()) {
             match self.brick.iter_mut().find(|(of, _)| *of == stage) {
                 Some((_, recent)) => recent.push(ms / bricks),
                 None => self.brick.push((stage, Recent(vec![ms / bricks]))),

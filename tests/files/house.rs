@@ -287,7 +287,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
-    ("src/cao/build.rs", &["error", "ambient"]),
+    ("src/cao/build.rs", &["error", "stages", "ambient"]),
     // The methods.
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),

@@ -57,7 +57,7 @@ impl Commit {
     ) -> Result<()> {
         rec.barrier(&[Access::IndirectRead], &[Access::TransferWrite]);
         rec.fill(&self.turn, 0, self.turn.bytes(), 0)?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageWrite]);
+        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
         let binds = kernel::ChooseBindings { list, turn: &self.turn };
         rec.dispatch(&self.choose, &binds, bytemuck::bytes_of(&params(field, slice)), [1; 3])?;
         rec.barrier(&[Access::StorageWrite], &[Access::IndirectRead]);
