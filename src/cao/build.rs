@@ -24,7 +24,9 @@ impl Budget {
     /// Refuses what allows nothing.
     pub(crate) fn check(self) -> Result<()> {
         match self {
-            Self::Bricks(0) => Err(Error::refused("budget", "allows 0 bricks; 1 is the least, or nothing would ever end")),
+            Self::Bricks(0) => {
+                Err(Error::refused("budget", "allows 0 bricks; 1 is the least, or nothing would ever end"))
+            }
             Self::Ms(ms) if !(ms.is_finite() && ms > 0.0) => {
                 Err(Error::refused("budget", format!("is {ms} ms; must be a number above 0")))
             }

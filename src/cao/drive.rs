@@ -218,7 +218,8 @@ pub fn run(gpu: &Gpu, parts: &[Part], pace: &mut Pace, progress: &mut dyn FnMut(
             }
             Extent::Items { items, first } => {
                 let count = read_count(gpu, items)?;
-                let mut record = |rec: &mut Recorder, items: Range<u32>| (part.record)(rec, &Take::These(items));
+                let mut record =
+                    |rec: &mut Recorder, items: Range<u32>| (part.record)(rec, &Take::These(items));
                 let told = &mut |of: f64| progress(share(of));
                 let ms = in_parts(gpu, part.stage, count, first, &mut record, told)?;
                 add(&mut timings, part.stage, ms);

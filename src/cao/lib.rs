@@ -79,6 +79,7 @@ pub mod verify;
 pub use cao_gpu as gpu;
 pub use cao_model as model;
 
+pub use build::{Budget, Stale, Updated};
 pub use cao_model::clip::{Clip, Mode, Pose, Shape};
 pub use cao_model::fit::Fitting;
 pub use cao_model::frame::{Frame, Turn};
@@ -90,7 +91,6 @@ pub use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
 pub use cao_model::transfer::TransferFunction;
 pub use cao_model::view::{StereoRig, View};
 pub use cao_model::volume::Volume;
-pub use build::{Budget, Stale, Updated};
 pub use error::{Error, Result};
 pub use gpu::{Gpu, OpenOptions};
 pub use renderer::Renderer;

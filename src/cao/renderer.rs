@@ -132,7 +132,8 @@ impl Renderer {
             self.subject.setup = setup;
         }
         self.subject.wanted = setup;
-        let held = self.prepare_clips().and_then(|()| if waits { Ok(()) } else { self.hold(before.0.method) });
+        let held =
+            self.prepare_clips().and_then(|()| if waits { Ok(()) } else { self.hold(before.0.method) });
         if let Err(error) = held {
             // Maps of one radius under rays of another would leave voxels stale.
             (self.subject.setup, self.subject.wanted) = before;
@@ -169,8 +170,8 @@ impl Renderer {
         written
     }
 
-    /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or has a new scale; moving
-    /// and turning never do. On error the clips stay as they were.
+    /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or its axes have a new ratio, and
+    /// with methods `lao` and `cao` where it has a new scale; moving and turning never do. On error the clips stay as they were.
     pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
         if let Err(error) = self.prepare_clips() {

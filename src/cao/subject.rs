@@ -76,8 +76,8 @@ impl Subject {
         0.5 * Vec3::new(edge(0), edge(1), edge(2)).length()
     }
 
-    /// Makes the maps of clip meshes that are not there yet, dilated by `radius_mm`. Uses the device's queue only then.
-    pub(crate) fn prepare_clips(&mut self, radius_mm: f32) -> Result<Timings> {
+    /// Makes the maps of clip meshes that are not there yet, dilated by `radius_mm` where it is a number. Uses the device's queue only then.
+    pub(crate) fn prepare_clips(&mut self, radius_mm: Option<f32>) -> Result<Timings> {
         let half_mm = self.half_diagonal();
         let Self { gpu, peel, dilate, clips, clip_set, wanted, .. } = self;
         clip_set.prepare(gpu, peel, dilate, clips, radius_mm, half_mm, wanted.maps)

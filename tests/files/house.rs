@@ -292,10 +292,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/method.rs", &["error", "subject", "ambient", "cast", "rays"]),
-    (
-        "src/cao/renderer.rs",
-        &["error", "host", "drive", "field", "draw", "subject", "ambient", "method"],
-    ),
+    ("src/cao/renderer.rs", &["error", "host", "drive", "field", "draw", "subject", "ambient", "method"]),
     ("src/cao/renderer/", &["ambient", "build", "clip", "draw", "drive", "error", "field", "stages"]),
     // Instruments take the renderer.
     ("src/cao/verify/", &["error", "host", "drive", "field", "cast", "draw", "ambient", "renderer"]),

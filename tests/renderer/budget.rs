@@ -1,6 +1,6 @@
 //! Updates that span frames: what is shown is complete at every time, it ends, and it ends where an update without a budget does.
 
-use crate::scenes::{NAMES, Scene, assert_as_fresh, scene};
+use crate::scenes::{NAMES, Scene, assert_as_fresh, scene_up_to};
 use cao::renderer::Renderer;
 use cao::{Budget, Stale, Updated};
 use cao_gpu::{Counts, Gpu, Timings};
@@ -50,10 +50,10 @@ struct Seen {
 /// an older one than before; what pictures show of anything else is the newest; what is settled is what a fresh renderer has.
 fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Seen {
     let mut random = Random::new(seed);
-    let mut scene = scene(&mut random, name, method);
-    scene.setup.occlusion.radius_mm = scene.setup.occlusion.radius_mm.min(6.0);
+    let mut scene = scene_up_to(25, &mut random, name, method);
     // One renderer under budgets, and one that does everything at once.
-    let make = || Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
+    let make =
+        || Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
     let (mut renderer, mut at_once) = (make().unwrap(), make().unwrap());
     let mut told = VecDeque::new();
     let mut history = Vec::new();
@@ -87,7 +87,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
             0 => Budget::Bricks(u32::MAX),
             1 | 2 => Budget::Ms(random.between(0.1, 20.0)),
             3 => Budget::Bricks(1),
-            _ => Budget::Bricks(1 + random.below(24) as u32),
+            _ => Budget::Bricks(1 + random.below(9) as u32),
         };
         let (updated, timings) = frame(gpu, &mut renderer, budget);
         if let Budget::Bricks(most) = budget {
@@ -115,7 +115,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
         if updated.opens() {
             *if volumes.len() == 1 { &mut found.whole } else { &mut found.spanned } += 1;
         }
-        if random.below(8) == 0 {
+        if random.below(12) == 0 {
             assert!(depths(&renderer, &scene) == depths(&at_once, &scene), "picture {}", context());
         }
         // Times come up to three frames late, or not at all.
@@ -130,7 +130,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
             assert_eq!(renderer.stale(), Stale::default());
             assert!(bits(&renderer) == bits(&at_once), "settled {}", context());
             found.settled += 1;
-            if random.below(16) == 0 {
+            if random.below(64) == 0 {
                 assert_as_fresh(&scene, &renderer, &scene.renderer(gpu), &context);
             }
         } else {
@@ -150,8 +150,8 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
         }
     }
     // It settles.
-    for _ in 0..200 {
-        let (updated, timings) = frame(gpu, &mut renderer, Budget::Bricks(9));
+    for _ in 0..60 {
+        let (updated, timings) = frame(gpu, &mut renderer, Budget::Bricks(5));
         renderer.updated(&updated, timings.total()).unwrap();
     }
     assert_eq!(renderer.stale(), Stale::default());

@@ -171,7 +171,12 @@ impl Scene {
 
 /// A scene of its own size and spacing, without clips.
 pub fn scene(random: &mut Random, name: &str, method: Method) -> Scene {
-    let dims = std::array::from_fn(|_| 9 + random.below(30) as usize);
+    scene_up_to(39, random, name, method)
+}
+
+/// The same with fewer voxels than this along each edge.
+pub fn scene_up_to(edge: u64, random: &mut Random, name: &str, method: Method) -> Scene {
+    let dims = std::array::from_fn(|_| 9 + random.below(edge - 9) as usize);
     let spacing = match random.below(2) {
         0 => [1.0; 3],
         _ => std::array::from_fn(|_| f64::from(random.between(0.4, 2.0))),

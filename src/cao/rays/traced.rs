@@ -220,9 +220,7 @@ impl Ambient for Traced {
 
     fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a> {
         let (k, v) = (&self.kernels, &self.volumes);
-        Part::short(stages::CLIPS, move |rec| {
-            on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks)
-        })
+        Part::short(stages::CLIPS, move |rec| on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks))
     }
 
     fn written(&self, changed: Changed) -> Written<'_> {

@@ -207,12 +207,8 @@ impl Renderer {
         self.note_end();
         self.building.updates += 1;
         let Building { build, spare, .. } = &mut self.building;
-        let begun = Begun {
-            changed: self.changed,
-            unshown: self.unshown,
-            build: build.take(),
-            spare: spare.take(),
-        };
+        let begun =
+            Begun { changed: self.changed, unshown: self.unshown, build: build.take(), spare: spare.take() };
         if begun.changed != Changed::NOTHING || begun.build.is_some() {
             self.invalidate();
         }

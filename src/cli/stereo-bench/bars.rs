@@ -224,16 +224,7 @@ impl Baseline {
         let (field, all) = (&self.field, Take::These(0..self.bricks));
         let (occlusion, reference_mm) = (&self.occlusion, self.reference_mm);
         let (scope, work) = (Scope::All, Work::Full);
-        self.kernels.lao.record(
-            &mut rec,
-            field,
-            occlusion,
-            reference_mm,
-            scope,
-            work,
-            bindings,
-            &all,
-        )?;
+        self.kernels.lao.record(&mut rec, field, occlusion, reference_mm, scope, work, bindings, &all)?;
         rec.end_stage()?;
         Ok(rec.submit_and_wait()?.total() * self.scale)
     }
