@@ -3,6 +3,7 @@
 
 use cao::gpu::ash::{self, vk};
 use cao::gpu::{Access, Adopted, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao::renderer::{Target, Targets};
 use cao::{Clip, Look, Renderer, Setup, Shape, StereoRig, TransferFunction};
 use std::error::Error;
 
@@ -57,6 +58,7 @@ impl Host {
             physical_device: self.physical,
             device: self.device.clone(),
             queue_family: self.family,
+            compute_only: false,
             queue: Some(self.queue),
         }
     }
@@ -121,7 +123,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         rec.discard(&colour);
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, [256, 256])?;
+        renderer.record_draw(
+            &mut rec,
+            &views,
+            &Look::default(),
+            &Targets::new(&Target::layers(&colour, &depth, views.len()), [256, 256]),
+        )?;
         let recorded = rec.finish()?;
         host.submit_and_wait(cmd)?;
         let stages = recorded.timings()?.ok_or("the host has waited")?;

@@ -15,9 +15,9 @@
 @group(0) @binding(9) var<storage, read> layers: Layers;
 @group(0) @binding(2) var<storage, read> bounds: Bounds;
 
-// a layer a view: premultiplied, linear; Vulkan's 0 ... 1
+// a layer a view: premultiplied, linear; depth by the view's planes, and before where rays end, see `ended`
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
-@group(0) @binding(11) var depths: texture_storage_2d_array<r32float, write>;
+@group(0) @binding(11) var depths: texture_storage_2d_array<r32float, read_write>;
 // the colours of `half_floats`: WGSL states a storage image's format, so that each has an entry point
 @group(0) @binding(12) var half_colours: texture_storage_2d_array<rgba16float, write>;
 
@@ -38,6 +38,8 @@ struct RaycastParams {
     // tiles of the band to draw, counted along its rows of tiles
     first_tile: u32,
     tiles: u32,
+    // 1: `depths` holds at which depth in mm a pixel's rays end at the latest
+    ended: u32,
 }
 
 struct Pixel {
@@ -242,8 +244,8 @@ fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
     return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
 }
 
-// What an eye sees at a place in pixels.
-fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
+// What an eye sees at a place in pixels, up to a view depth.
+fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
@@ -256,9 +258,12 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
 
     var colour = vec3(0.0);
     var alpha = 0.0;
-    var depth = 1.0;
+    // Reversed depths are larger nearby.
+    let nothing = select(1.0, 0.0, eye.depth.y > 0.0);
+    var depth = nothing;
     // Parts of steps so far, integers so that samples keep their places whatever is leapt over; and how many the next step has.
-    let shown = shown_part(ray, bricks);
+    var shown = shown_part(ray, bricks);
+    shown.y = min(shown.y, end);
     var n = PARTS * u32(shown.x);
     var size = PARTS;
     // Up to here the ray is known to be in the bricks that it looked at last.
@@ -381,7 +386,7 @@ fn seen(eye: Eye, place: vec2<f32>) -> Pixel {
         );
         colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
         alpha += (1.0 - alpha) * stops;
-        if depth == 1.0 && alpha >= 0.5 {
+        if depth == nothing && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;
         }
         if over || ends(colour, 1.0 - alpha) {
@@ -412,10 +417,14 @@ fn is_inside(texel: vec2<u32>) -> bool {
 // The mean of a pixel's samples, and the depth of the one nearest to its centre.
 fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
     let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
+    var end = 3e38;
+    if params.ended == 1u {
+        end = textureLoad(depths, texel, view).r;
+    }
     var mean = Pixel(vec4(0.0), 1.0);
     for (var i = 0u; i < frame.samples; i++) {
         let pair = frame.places[i / 2u];
-        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u));
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end);
         mean.colour += frame.share * one.colour;
         if i == 0u {
             mean.depth = one.depth;

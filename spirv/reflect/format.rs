@@ -19,10 +19,22 @@ pub enum Format {
     Rg32Float,
     /// Four 8-bit channels read as 0…1, linear.
     Rgba8Unorm,
+    /// The same, coded by the curve of sRGB, which reading and writing undo and do.
+    Rgba8Srgb,
+    /// Four 8-bit channels, blue first, read as 0…1, linear.
+    Bgra8Unorm,
+    /// The same, coded by the curve of sRGB.
+    Bgra8Srgb,
+    /// Ten bits each of red (the lowest), green and blue, two of alpha, read as 0…1.
+    A2b10g10r10Unorm,
     /// Four half floats.
     Rgba16Float,
     /// Four floats.
     Rgba32Float,
+    /// Depth, 16 bits read as 0…1.
+    D16Unorm,
+    /// Depth, 24 bits read as 0…1, beside 8 bits of stencil, which are left alone.
+    D24UnormS8,
     /// Depth, one float.
     D32Float,
 }
@@ -37,10 +49,12 @@ impl Format {
             Self::R32Float => (4, Texel::Float),
             Self::R32Uint => (4, Texel::Uint),
             Self::Rg32Float => (8, Texel::Float),
-            Self::Rgba8Unorm => (4, Texel::Float),
+            Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => (4, Texel::Float),
+            Self::A2b10g10r10Unorm => (4, Texel::Float),
             Self::Rgba16Float => (8, Texel::Float),
             Self::Rgba32Float => (16, Texel::Float),
-            Self::D32Float => (4, Texel::Depth),
+            Self::D16Unorm => (2, Texel::Depth),
+            Self::D24UnormS8 | Self::D32Float => (4, Texel::Depth),
         }
     }
 

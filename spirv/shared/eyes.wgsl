@@ -15,7 +15,7 @@ struct Eye {
     base: vec4<f32>,
     along_u: vec4<f32>,
     along_v: vec4<f32>,
-    // Vulkan depth of view depth t: x + y / t; near and far plane in mm
+    // depth of view depth t: x + y / t, reversed where y > 0; near and far plane in mm
     depth: vec4<f32>,
     // world -> clip space
     view_projection: mat4x4<f32>,

@@ -16,6 +16,7 @@ use crate::draw::eyes::FrameBuffer;
 use crate::draw::picture::Picture;
 use crate::draw::present::Present;
 use crate::draw::raycast::Raycast;
+use crate::draw::scene_depth::SceneDepth;
 use crate::drive::Pace;
 use crate::field::Field;
 use crate::field::volume_image;
@@ -42,7 +43,9 @@ use building::Building;
 
 pub use crate::draw::band::Bands;
 pub use crate::draw::budget::{Drawn, Quality};
+pub use crate::draw::eyes::{LateViews, Views};
 pub use crate::draw::picture::COLOUR;
+pub use crate::draw::target::{Coding, Over, Place, Target, Targets};
 pub use read_back::StereoImage;
 
 /// Renders one volume.
@@ -57,6 +60,7 @@ pub struct Renderer {
     bounds: Buffer,
     extent: Extent,
     raycast: Raycast,
+    scene_depth: SceneDepth,
     present: Present,
     frame: FrameBuffer,
     /// What is presented; kept from frame to frame.
@@ -74,8 +78,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Copies a volume to the device and builds everything that draws it into colour images of format `colour`. Uses the
-    /// device's queue and waits for it.
+    /// Copies a volume to the device and builds everything that draws it, into colour images of format `colour` by
+    /// [`Over::Nothing`]; for other targets a pipeline is built when they first come. Uses the device's queue and waits for it.
     pub fn new(
         gpu: &Gpu,
         volume: &Volume,
@@ -92,6 +96,7 @@ impl Renderer {
             bounds: Bounds::buffer(gpu)?,
             extent: Extent::new(gpu)?,
             raycast: Raycast::new(gpu, &subject.field)?,
+            scene_depth: SceneDepth::new(gpu)?,
             present: Present::new(gpu, colour)?,
             frame: FrameBuffer::new(gpu)?,
             presented: Mutex::new(None),

@@ -36,6 +36,8 @@ pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 /// How far rays of the picture may leap.
 pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
+/// Where a host's scene ends the picture's rays.
+pub const SCENE_DEPTH: Stage = Stage::new("scene depth", Phase::Draw);
 /// The picture.
 pub const RAYCAST: Stage = Stage::new("raycast", Phase::Draw);
 /// The picture into a host's attachments.

@@ -293,7 +293,7 @@ fn image_view<'a>(
         Touch { id: image.0.id, name: image.name(), via: name, range, access: Access::SampledRead },
         out,
     );
-    let info = vk::DescriptorImageInfo::default().image_view(view).image_layout(vk::ImageLayout::GENERAL);
+    let info = vk::DescriptorImageInfo::default().image_view(view).image_layout(image.0.layout);
     Ok(Descriptor::Image([info]))
 }
 

@@ -33,8 +33,10 @@ pub struct Touch<'a> {
 /// What a resource has been through.
 #[derive(Debug, Clone, Default)]
 struct State {
-    /// An image that has not been discarded, cleared of its undefined layout, yet.
+    /// An image that has not been discarded, cleared of its undefined layout, yet; or a host's that is not held.
     undefined: bool,
+    /// An image of a host, held between acquiring and releasing.
+    lent: bool,
     /// Accesses that a later command may still have to be ordered after.
     pending: Vec<Pending>,
     /// Bytes of a buffer that may be indirect arguments: what the program wrote last there are numbers that every device can dispatch.
@@ -65,6 +67,26 @@ impl Hazards {
     /// Makes an image known; it must be discarded before it is used.
     pub fn add_image(&mut self, id: ResourceId) {
         self.resources.insert(id, State { undefined: true, ..State::default() });
+    }
+
+    /// Makes a host's image known; it must be acquired before it is used.
+    pub fn add_hosts_image(&mut self, id: ResourceId) {
+        self.resources.insert(id, State { undefined: true, lent: true, ..State::default() });
+    }
+
+    /// Whether a host's image is with the host at this point.
+    pub fn is_hosts(&self, id: ResourceId) -> bool {
+        self.resources.get(&id).is_some_and(|state| state.lent && state.undefined)
+    }
+
+    /// Records that a host's image was taken over: what follows waits for that.
+    pub fn take_over(&mut self, id: ResourceId) {
+        self.resources.insert(id, State { lent: true, ..State::default() });
+    }
+
+    /// Records that a host's image was given back: that waited for all before.
+    pub fn give_back(&mut self, id: ResourceId) {
+        self.add_hosts_image(id);
     }
 
     /// Forgets a resource that no longer exists.
@@ -122,6 +144,12 @@ impl Hazards {
                 touch.name, touch.via
             ));
         };
+        if state.undefined && state.lent {
+            return Err(format!(
+                "{command} uses image {} as `{}` while it is with its host; add `rec.acquire(&image)` before, and `rec.release(&image)` after the last use",
+                touch.name, touch.via
+            ));
+        }
         if state.undefined {
             return Err(format!(
                 "{command} uses image {} as `{}` before anything gave it a layout; add `rec.discard(&image)` once before its first use",
@@ -214,6 +242,9 @@ impl Hazards {
             state.pending.clear();
             if let Some(recorded) = recorded.resources.get(id) {
                 state.undefined &= recorded.undefined;
+                if state.lent {
+                    state.undefined = recorded.undefined;
+                }
                 state.dispatchable.clone_from(&recorded.dispatchable);
             }
         }

@@ -3,8 +3,10 @@
 use super::{
     Gpu,
     device::{Inner, vulkan},
+    external::States,
     format::{Format, VulkanFormat},
     hazard::ResourceId,
+    shader::Texel,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -74,6 +76,10 @@ pub(crate) struct ImageInner {
     pub whole: vk::ImageView,
     /// One 2D view for each layer; empty for a 3D image.
     pub layers: Vec<vk::ImageView>,
+    /// The layout in which commands find it.
+    pub layout: vk::ImageLayout,
+    /// States of a host's image, which is not destroyed here; `None` for our own.
+    pub host: Option<States>,
     memory: Option<Allocation>,
 }
 
@@ -85,7 +91,7 @@ impl Gpu {
     /// cannot be used so, [`Error::Memory`] or [`Error::Vulkan`] if the device refuses.
     pub fn image(&self, name: &str, desc: &ImageDesc) -> Result<Image> {
         let gpu = &self.0;
-        check(gpu, name, desc)?;
+        check(gpu, name, desc, COPIES)?;
         let create = vk::ImageCreateInfo::default()
             .image_type(match desc.kind {
                 ImageKind::D2 => vk::ImageType::TYPE_2D,
@@ -97,23 +103,13 @@ impl Gpu {
             .array_layers(desc.layers)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(usage(desc))
+            .usage(usage(desc, COPIES))
             .initial_layout(vk::ImageLayout::UNDEFINED);
         // SAFETY: the device is alive; size, format and usage were checked against it.
         let raw = unsafe { gpu.device.create_image(&create, None) }.map_err(vulkan("vkCreateImage", name))?;
-        let id = Inner::new_id();
         // From here on the drop of `image` cleans up.
-        let mut image = ImageInner {
-            gpu: gpu.clone(),
-            id,
-            name: name.into(),
-            desc: *desc,
-            raw,
-            whole: vk::ImageView::null(),
-            layers: Vec::new(),
-            memory: None,
-        };
-        gpu.hazards().add_image(id);
+        let mut image = ImageInner::bare(gpu, name, desc, raw);
+        gpu.hazards().add_image(image.id);
         gpu.set_name(raw, name);
         // SAFETY: `raw` was just made of this device.
         let requirements = unsafe { gpu.device.get_image_memory_requirements(raw) };
@@ -122,36 +118,35 @@ impl Gpu {
         let bound = unsafe { gpu.device.bind_image_memory(raw, memory.memory(), memory.offset()) };
         image.memory = Some(memory);
         bound.map_err(vulkan("vkBindImageMemory", name))?;
-        // An image that is only copied may have no views.
-        image.whole = image.view(0, desc.layers, desc.kind == ImageKind::D2)?;
-        if desc.kind == ImageKind::D2 {
-            for layer in 0..desc.layers {
-                let view = image.view(layer, 1, false)?;
-                image.layers.push(view);
-            }
-        }
+        image.make_views()?;
         Ok(Image(Arc::new(image)))
     }
 }
 
+/// What our own images can do besides their uses.
+const COPIES: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+    vk::ImageUsageFlags::TRANSFER_SRC.as_raw() | vk::ImageUsageFlags::TRANSFER_DST.as_raw(),
+);
+
 /// Vulkan's usage flags.
-fn usage(desc: &ImageDesc) -> vk::ImageUsageFlags {
+fn usage(desc: &ImageDesc, more: vk::ImageUsageFlags) -> vk::ImageUsageFlags {
     use vk::ImageUsageFlags as U;
-    let attachment = match desc.format.aspect() {
-        vk::ImageAspectFlags::DEPTH => U::DEPTH_STENCIL_ATTACHMENT,
+    let attachment = match desc.format.texel() {
+        Texel::Depth => U::DEPTH_STENCIL_ATTACHMENT,
         _ => U::COLOR_ATTACHMENT,
     };
     [(ImageUse::SAMPLED, U::SAMPLED), (ImageUse::STORAGE, U::STORAGE), (ImageUse::ATTACHMENT, attachment)]
         .into_iter()
         .filter(|(ours, _)| desc.usage.contains(*ours))
-        .fold(U::TRANSFER_SRC | U::TRANSFER_DST, |all, (_, flag)| all | flag)
+        .fold(more, |all, (_, flag)| all | flag)
 }
 
 pub(crate) fn extent([width, height, depth]: [u32; 3]) -> vk::Extent3D {
     vk::Extent3D { width, height, depth }
 }
 
-fn check(gpu: &Inner, name: &str, desc: &ImageDesc) -> Result<()> {
+/// Refuses what no image of this device is, with `more` uses than those of `desc`.
+pub(crate) fn check(gpu: &Inner, name: &str, desc: &ImageDesc, more: vk::ImageUsageFlags) -> Result<()> {
     let what = format!("image {name}");
     let impossible = |problem: &str| Err(Error::Config { what: what.clone(), problem: problem.into() });
     if desc.dims.contains(&0) || desc.layers == 0 {
@@ -195,7 +190,7 @@ fn check(gpu: &Inner, name: &str, desc: &ImageDesc) -> Result<()> {
             desc.format.vk(),
             kind,
             vk::ImageTiling::OPTIMAL,
-            usage(desc),
+            usage(desc, more),
             vk::ImageCreateFlags::empty(),
         )
     };
@@ -204,7 +199,7 @@ fn check(gpu: &Inner, name: &str, desc: &ImageDesc) -> Result<()> {
             "{what}: {} cannot use format {:?} for {:?} ({result})",
             gpu.info.name,
             desc.format,
-            usage(desc)
+            usage(desc, more)
         ),
     })
 }
@@ -222,6 +217,33 @@ impl Image {
 }
 
 impl ImageInner {
+    /// Neither memory nor views yet.
+    pub(crate) fn bare(gpu: &Arc<Inner>, name: &str, desc: &ImageDesc, raw: vk::Image) -> Self {
+        Self {
+            gpu: gpu.clone(),
+            id: Inner::new_id(),
+            name: name.into(),
+            desc: *desc,
+            raw,
+            whole: vk::ImageView::null(),
+            layers: Vec::new(),
+            layout: vk::ImageLayout::GENERAL,
+            host: None,
+            memory: None,
+        }
+    }
+
+    /// Of all of it and, flat, of each layer.
+    pub(crate) fn make_views(&mut self) -> Result<()> {
+        let flat = self.desc.kind == ImageKind::D2;
+        self.whole = self.view(0, self.desc.layers, flat)?;
+        for layer in 0..if flat { self.desc.layers } else { 0 } {
+            let view = self.view(layer, 1, false)?;
+            self.layers.push(view);
+        }
+        Ok(())
+    }
+
     fn view(&self, first: u32, count: u32, array: bool) -> Result<vk::ImageView> {
         let create = vk::ImageViewCreateInfo::default()
             .image(self.raw)
@@ -232,6 +254,8 @@ impl ImageInner {
                 (ImageKind::D2, false) => vk::ImageViewType::TYPE_2D,
             })
             .subresource_range(vk::ImageSubresourceRange {
+                // A view shows depth or stencil; only depth is of use here.
+                aspect_mask: self.desc.format.seen(),
                 base_array_layer: first,
                 layer_count: count,
                 ..self.all()
@@ -263,7 +287,9 @@ impl Drop for ImageInner {
             for view in self.layers.drain(..).chain([self.whole]) {
                 self.gpu.device.destroy_image_view(view, None);
             }
-            self.gpu.device.destroy_image(self.raw, None);
+            if self.host.is_none() {
+                self.gpu.device.destroy_image(self.raw, None);
+            }
         }
         if let Some(memory) = self.memory.take() {
             self.gpu.memory.free(memory);

@@ -65,12 +65,13 @@ pub enum DeviceKind {
 impl DeviceInfo {
     pub(crate) fn of(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
-        let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+        // Those of Vulkan 1.3 under the names that instances of 1.1 know too.
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance4Properties::default();
         let mut chain = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut driver)
-            .push_next(&mut v11)
-            .push_next(&mut v13);
+            .push_next(&mut subgroup)
+            .push_next(&mut maintenance);
         // SAFETY: `device` was enumerated from `instance`; the chained structs outlive the call. Devices of older
         // versions, which do not know some, leave those zero.
         unsafe { instance.get_physical_device_properties2(device, &mut chain) };
@@ -106,7 +107,7 @@ impl DeviceInfo {
             max_image_2d: limits.max_image_dimension2_d,
             max_image_3d: limits.max_image_dimension3_d,
             max_image_layers: limits.max_image_array_layers,
-            max_buffer: v13.max_buffer_size,
+            max_buffer: maintenance.max_buffer_size,
             max_storage_range: limits.max_storage_buffer_range.into(),
             max_uniform_range: limits.max_uniform_buffer_range.into(),
             max_workgroups: limits.max_compute_work_group_count,
@@ -115,7 +116,7 @@ impl DeviceInfo {
             storage_alignment: limits.min_storage_buffer_offset_alignment,
             uniform_alignment: limits.min_uniform_buffer_offset_alignment,
             timestamp_period_ns: limits.timestamp_period.into(),
-            subgroup: v11.subgroup_size,
+            subgroup: subgroup.subgroup_size,
             device_memory: memory
                 .memory_heaps_as_slice()
                 .iter()
@@ -197,11 +198,11 @@ mod tests {
     fn a_graphics_card_is_preferred_unless_it_lacks_something() {
         let soft = device("llvmpipe", DeviceKind::Cpu, &[]);
         let card = device("Card 5000", DeviceKind::Discrete, &[]);
-        let old = device("Old Card", DeviceKind::Discrete, &["feature multiview"]);
+        let old = device("Old Card", DeviceKind::Discrete, &["feature synchronization2"]);
         assert_eq!(choose(&[soft.clone(), old.clone(), card.clone()], None).unwrap(), 2);
         assert_eq!(choose(&[old.clone(), soft.clone()], None).unwrap(), 1);
         let message = choose(&[old], None).unwrap_err().to_string();
-        assert!(message.contains("Old Card") && message.contains("multiview"), "{message}");
+        assert!(message.contains("Old Card") && message.contains("synchronization2"), "{message}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::{
     draw::COLOURS,
     feature,
     format::{Format, VulkanFormat},
-    shader::{Binding, BindingKind, EntryPoint, Shader, Stage},
+    shader::{Binding, BindingKind, EntryPoint, Shader, Stage, Texel},
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -42,7 +42,6 @@ pub(crate) struct Slot {
 pub(crate) struct Targets {
     pub colours: Vec<Format>,
     pub depth: Option<Format>,
-    pub view_mask: u32,
 }
 
 /// How to draw. There is no vertex input: vertex shaders fetch from storage buffers. Viewport and scissor are the whole picture.
@@ -63,8 +62,6 @@ pub struct GraphicsDesc<'a> {
     pub depth_write: bool,
     /// Which faces are dropped.
     pub cull: Cull,
-    /// Layers drawn at once, one bit each (multiview); 0 draws one layer.
-    pub view_mask: u32,
     /// How colours are combined with the stored ones.
     pub blend: Blend,
 }
@@ -80,7 +77,6 @@ impl Default for GraphicsDesc<'_> {
             depth_test: DepthTest::Always,
             depth_write: false,
             cull: Cull::None,
-            view_mask: 0,
             blend: Blend::None,
         }
     }
@@ -171,8 +167,7 @@ impl Gpu {
                 problem: "is written while drawing; vertex and fragment shaders may only read".into(),
             });
         }
-        pipeline.targets =
-            Some(Targets { colours: desc.colours.to_vec(), depth: desc.depth, view_mask: desc.view_mask });
+        pipeline.targets = Some(Targets { colours: desc.colours.to_vec(), depth: desc.depth });
         let module = Module::new(gpu, shader)?;
         let names = (c_name(vertex)?, c_name(fragment)?);
         let stages = [
@@ -216,7 +211,6 @@ impl Gpu {
             .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
         let formats: Vec<_> = desc.colours.iter().map(|format| format.vk()).collect();
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .view_mask(desc.view_mask)
             .color_attachment_formats(&formats)
             .depth_attachment_format(desc.depth.map_or(vk::Format::UNDEFINED, Format::vk));
         let create = vk::GraphicsPipelineCreateInfo::default()
@@ -249,9 +243,6 @@ fn entry_point(shader: &'static Shader, name: &str, stage: Stage) -> Result<&'st
     })
 }
 
-/// Most views of one pass, which every device of Vulkan 1.3 has.
-const MAX_VIEWS: u32 = 6;
-
 fn check_graphics(gpu: &Inner, name: &str, desc: &GraphicsDesc<'_>) -> Result<()> {
     let blends = |format: &Format| feature::blends(&gpu.instance, gpu.physical, format.vk());
     let unblended = match desc.blend {
@@ -271,14 +262,12 @@ fn check_graphics(gpu: &Inner, name: &str, desc: &GraphicsDesc<'_>) -> Result<()
         "draws to nothing; it needs a colour or a depth attachment"
     } else if desc.depth.is_none() && (desc.depth_write || desc.depth_test != DepthTest::Always) {
         "tests or writes depth but has no depth attachment"
-    } else if desc.colours.iter().any(|c| c.aspect() != vk::ImageAspectFlags::COLOR) {
+    } else if desc.colours.iter().any(|c| c.texel() == Texel::Depth) {
         "has a depth format among its colour attachments"
-    } else if desc.depth.is_some_and(|d| d.aspect() != vk::ImageAspectFlags::DEPTH) {
+    } else if desc.depth.is_some_and(|d| d.texel() != Texel::Depth) {
         "has a colour format as its depth attachment"
     } else if desc.colours.len() > COLOURS.len() {
         "has more than 4 colour attachments"
-    } else if desc.view_mask >> MAX_VIEWS != 0 {
-        "has more than 6 views"
     } else {
         return Ok(());
     };

@@ -3,6 +3,7 @@
 use super::{
     Buffer, BufferUse, Image, ImageKind, Recorder,
     access::Access,
+    device::Inner,
     format::VulkanFormat,
     hazard::Touch,
     image::{ImageInner, extent},
@@ -138,6 +139,7 @@ impl Recorder {
         size: [u32; 3],
     ) -> Result<()> {
         check_direction(buffer, BufferUse::Readback)?;
+        Inner::check_copies(image)?;
         let (layer_range, region, bytes) = region(buffer, offset, image, origin, size)?;
         let touches = [
             source(buffer, offset..offset + bytes),
@@ -179,6 +181,7 @@ impl Recorder {
             );
         }
         let origin = if flat { [origin[0], origin[1], layer] } else { origin };
+        Inner::check_copies(image)?;
         let (layer_range, region, bytes) = region(buffer, offset, image, origin, size)?;
         let touches = [
             layers(image, "source", layer_range, Access::TransferRead),
@@ -201,6 +204,8 @@ impl Recorder {
     /// # Errors
     /// [`Error::Config`] for images that differ, [`Error::Hazard`] for a missing barrier.
     pub fn copy_image(&mut self, from: &Image, to: &Image) -> Result<()> {
+        Inner::check_copies(from)?;
+        Inner::check_copies(to)?;
         let (a, b) = (from.desc(), to.desc());
         if (a.dims, a.layers, a.format, a.kind) != (b.dims, b.layers, b.format, b.kind) {
             return refuse(
@@ -234,6 +239,7 @@ impl Recorder {
     /// # Errors
     /// [`Error::Config`] for another depth, [`Error::Hazard`] for a missing barrier.
     pub fn clear_image(&mut self, image: &Image, value: [f32; 4]) -> Result<()> {
+        Inner::check_copies(image)?;
         let depth = match image.desc().format.texel() {
             Texel::Depth => clear_depth(image, value[0])?,
             _ => vk::ClearDepthStencilValue::default(),
@@ -281,7 +287,7 @@ pub(crate) fn clear_colour(texel: Texel, value: [f32; 4]) -> vk::ClearColorValue
 
 fn sublayers(image: &ImageInner, range: Range<u32>) -> vk::ImageSubresourceLayers {
     vk::ImageSubresourceLayers {
-        aspect_mask: image.desc.format.aspect(),
+        aspect_mask: image.desc.format.seen(),
         mip_level: 0,
         base_array_layer: range.start,
         layer_count: range.end - range.start,

@@ -29,8 +29,10 @@ pub struct View {
     pub tan: Tangents,
     /// Distance in mm of the plane of depth 0; nothing nearer is drawn.
     pub near_mm: f32,
-    /// Distance in mm of the plane of depth 1.
+    /// Distance in mm of the plane of depth 1, beyond which nothing is drawn; infinite where there is none.
     pub far_mm: f32,
+    /// Depth falls from 1 at `near_mm` to 0 at `far_mm`, as engines have it whose depth is a float.
+    pub reversed: bool,
 }
 
 impl View {
@@ -61,7 +63,7 @@ impl View {
     /// Refuses fields of view, planes and poses that no projection has.
     pub fn check(&self) -> Result<()> {
         let t = self.tan;
-        let finite = [t.left, t.right, t.up, t.down, self.near_mm, self.far_mm].iter().all(|v| v.is_finite());
+        let finite = [t.left, t.right, t.up, t.down, self.near_mm].iter().all(|v| v.is_finite());
         let refuse = |what: &str, problem: String| Err(Error::Config { what: what.into(), problem });
         if !finite || t.left >= t.right || t.down >= t.up {
             return refuse(
@@ -84,16 +86,29 @@ impl View {
         Mat4::from_rotation_translation(self.orientation, self.position).inverse()
     }
 
-    /// Eye frame → Vulkan clip space: y down, depth 0 at `near_mm`, 1 at `far_mm`.
+    /// Two numbers `[a, b]`: the depth of what is t mm away along the view axis is `a + b/t`.
+    pub fn depth_terms(&self) -> [f32; 2] {
+        let (n, f) = (self.near_mm, self.far_mm);
+        // Quotients that are right where f is infinite.
+        let (share, product) = (n / (f - n), n / (1.0 - n / f));
+        if self.reversed { [-share, product] } else { [1.0 + share, -product] }
+    }
+
+    /// Depth of what is nowhere: 1, or 0 where depth is reversed.
+    pub fn depth_of_nothing(&self) -> f32 {
+        if self.reversed { 0.0 } else { 1.0 }
+    }
+
+    /// Eye frame → Vulkan clip space: y down, depth 0 at `near_mm`, 1 at `far_mm`, or reversed.
     pub fn projection(&self) -> Mat4 {
         let Tangents { left, right, up, down } = self.tan;
-        let (n, f) = (self.near_mm, self.far_mm);
+        let [a, b] = self.depth_terms();
         let (w, h) = (right - left, up - down);
         Mat4::from_cols(
             Vec4::new(2.0 / w, 0.0, 0.0, 0.0),
             Vec4::new(0.0, -2.0 / h, 0.0, 0.0),
-            Vec4::new((right + left) / w, -(up + down) / h, -f / (f - n), -1.0),
-            Vec4::new(0.0, 0.0, -f * n / (f - n), 0.0),
+            Vec4::new((right + left) / w, -(up + down) / h, -a, -1.0),
+            Vec4::new(0.0, 0.0, b, 0.0),
         )
     }
 
@@ -229,6 +244,7 @@ impl StereoRig {
                 tan: Tangents { left: -up * aspect + shift, right: up * aspect + shift, up, down: -up },
                 near_mm,
                 far_mm,
+                reversed: false,
             };
             view.check().map(|()| view)
         };

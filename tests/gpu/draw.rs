@@ -1,4 +1,4 @@
-//! Drawing: orientation, culling, depth, layers, multiview, blending, and refusal of what does not fit.
+//! Drawing: orientation, culling, depth, layers, places, blending, and refusal of what does not fit.
 
 use cao_gpu::Access::*;
 use cao_gpu::{
@@ -18,17 +18,6 @@ const SHADER: &str = "
         return vec4f(select(c, c.yx, push.flip > 0.0), push.depth, 1.0);
     }
     @fragment fn colour() -> @location(0) vec4f { return push.colour; }
-    struct Eyes { @builtin(position) p: vec4f, @location(0) @interpolate(flat) eye: u32 }
-    struct First { index: u32 }
-    @group(0) @binding(0) var<uniform> first: First;
-    @vertex fn eyes(@builtin(vertex_index) i: u32, @builtin(view_index) eye: u32) -> Eyes {
-        // The first six make a rectangle of the whole picture, the last three a triangle round it.
-        var corners = array(
-            vec2f(-1.0, -1.0), vec2f(-1.0, 1.0), vec2f(1.0, -1.0), vec2f(1.0, -1.0), vec2f(-1.0, 1.0), vec2f(1.0, 1.0),
-            vec2f(-1.0, -1.0), vec2f(-1.0, 3.0), vec2f(3.0, -1.0));
-        return Eyes(vec4f(corners[i + first.index], 0.0, 1.0), eye);
-    }
-    @fragment fn which(in: Eyes) -> @location(0) vec4f { return vec4f(1.0 + f32(in.eye)); }
 ";
 
 #[repr(C)]
@@ -88,7 +77,13 @@ fn y_points_down_and_counter_clockwise_triangles_face_front() {
         let pipeline = gpu.graphics(shader, &desc).unwrap();
         let mut rec = gpu.recorder("draw").unwrap();
         rec.discard(&image);
-        let onto = Attachments { colours: &[(&image, Some(CLEAR))], depth: None, layer: None, size: [5, 5] };
+        let onto = Attachments {
+            colours: &[(&image, Some(CLEAR))],
+            depth: None,
+            layer: None,
+            at: [0; 2],
+            size: [5, 5],
+        };
         rec.draw(&pipeline, &[], &push(RED, 0.0, flip), onto, 3).unwrap();
         rec.submit_and_wait().unwrap();
         assert_eq!(texel(&gpu, &image, 0, UPPER_LEFT), if visible { RED } else { CLEAR }, "{cull:?} {flip}");
@@ -123,6 +118,7 @@ fn depth_is_tested_written_kept_and_cleared() {
         colours: &[(&image, Some(CLEAR))],
         depth: Some((&depth, Some(1.0))),
         layer: None,
+        at: [0; 2],
         size: [5, 5],
     };
     let then = Attachments { colours: &[(&image, None)], depth: Some((&depth, None)), ..first };
@@ -161,7 +157,13 @@ fn one_layer_is_drawn_and_the_others_stay() {
     rec.barrier(&[TransferWrite], &[AttachmentWrite]);
     for layer in [1, 2] {
         // Different layers need no barrier between them.
-        let onto = Attachments { colours: &[(&image, None)], depth: None, layer: Some(layer), size: [5, 5] };
+        let onto = Attachments {
+            colours: &[(&image, None)],
+            depth: None,
+            layer: Some(layer),
+            at: [0; 2],
+            size: [5, 5],
+        };
         rec.draw(&pipeline, &[], &push([layer as f32; 4], 0.0, false), onto, 3).unwrap();
     }
     rec.submit_and_wait().unwrap();
@@ -171,43 +173,30 @@ fn one_layer_is_drawn_and_the_others_stay() {
     close(gpu);
 }
 
-/// Value of each layer after `vertices` vertices from `first` on are drawn to two layers at once.
-fn both_eyes(gpu: &Gpu, first: u32, vertices: u32) -> [[f32; 1]; 2] {
+#[test]
+fn what_is_drawn_stays_in_its_rectangle() {
+    let gpu = open();
     let desc = GraphicsDesc {
-        vertex: "eyes",
-        fragment: "which",
+        vertex: "triangle",
+        fragment: "colour",
         colours: &[Format::R32Float],
-        view_mask: 0b11,
         ..Default::default()
     };
     let pipeline = gpu.graphics(compile(SHADER), &desc).unwrap();
-    let image = target(gpu, "eyes", Format::R32Float, 2);
-    let first = cao_testing::wgsl::device_buffer(gpu, "first", &[first, 0, 0, 0]);
+    let image = target(&gpu, "picture", Format::R32Float, 1);
     let mut rec = gpu.recorder("draw").unwrap();
     rec.discard(&image);
-    let onto = Attachments { colours: &[(&image, Some([0.0; 4]))], depth: None, layer: None, size: [5, 5] };
-    rec.draw(&pipeline, &[cao_testing::wgsl::bind("first", &first)], &[], onto, vertices).unwrap();
+    rec.clear_image(&image, [9.0; 4]).unwrap();
+    rec.barrier(&[TransferWrite], &[AttachmentWrite]);
+    // The viewport's upper left half is drawn, the rest of the rectangle cleared.
+    let colours = &[(&image, Some([3.0; 4]))];
+    let onto = Attachments { colours, depth: None, layer: None, at: [1, 2], size: [3, 2] };
+    rec.draw(&pipeline, &[], &push([1.0; 4], 0.0, false), onto, 3).unwrap();
     rec.submit_and_wait().unwrap();
-    [0, 1].map(|layer| texel(gpu, &image, layer, LOWER_RIGHT))
-}
-
-#[test]
-fn multiview_draws_a_picture_filling_rectangle_for_both_eyes() {
-    let gpu = open();
-    assert_eq!(both_eyes(&gpu, 0, 6), [[1.0], [2.0]]);
-    close(gpu);
-}
-
-/// Drivers that put other triangles of all views into the first layer. That of Mesa 22.3 forgets the view of every triangle that is not
-/// half of an upright rectangle; it does not in 25.0.
-const FORGET_THE_VIEW: &[&str] = &["Mesa 22.3"];
-
-#[test]
-fn multiview_draws_any_triangle_for_both_eyes_where_the_driver_is_not_known_to_forget_it() {
-    let gpu = open();
-    let known = FORGET_THE_VIEW.iter().any(|driver| gpu.info().driver.contains(driver));
-    let eyes = both_eyes(&gpu, 6, 3);
-    assert_eq!(eyes == [[1.0], [2.0]], !known, "{eyes:?} on {}", gpu.info().driver);
+    for (place, expected) in [([1, 2], 1.0), ([3, 3], 3.0), ([0, 2], 9.0), ([1, 1], 9.0), ([4, 3], 9.0)] {
+        assert_eq!(texel(&gpu, &image, 0, place), [expected], "{place:?}");
+    }
+    drop((image, pipeline));
     close(gpu);
 }
 
@@ -225,7 +214,8 @@ fn premultiplied_colours_go_over_what_is_there() {
     let image = target(&gpu, "picture", Format::Rgba32Float, 1);
     let mut rec = gpu.recorder("draw").unwrap();
     rec.discard(&image);
-    let onto = Attachments { colours: &[(&image, Some(CLEAR))], depth: None, layer: None, size: [5, 5] };
+    let onto =
+        Attachments { colours: &[(&image, Some(CLEAR))], depth: None, layer: None, at: [0; 2], size: [5, 5] };
     rec.draw(&pipeline, &[], &push([0.5, 0.0, 0.0, 0.5], 0.0, false), onto, 3).unwrap();
     rec.submit_and_wait().unwrap();
     assert_eq!(texel(&gpu, &image, 0, UPPER_LEFT), [0.625, 0.25, 0.375, 1.0]);
@@ -255,39 +245,38 @@ fn what_does_not_fit_is_refused_by_name() {
         (GraphicsDesc { depth: Some(Format::R32Float), ..good }, "colour format"),
         (GraphicsDesc { colours: &[Format::D32Float], ..good }, "depth format"),
         (GraphicsDesc { colours: &[Format::R32Float; 5], ..good }, "4 colour"),
-        (GraphicsDesc { view_mask: 0b100_0000, ..good }, "6 views"),
     ] {
         let message = problem(gpu.graphics(shader, &desc).map(drop));
         assert!(message.contains(word), "{message}");
     }
     assert!(problem(gpu.compute(shader, "triangle").map(drop)).contains("triangle (Vertex)"));
     let pipeline = gpu.graphics(shader, &good).unwrap();
-    let both = gpu.graphics(shader, &GraphicsDesc { view_mask: 3, ..good }).unwrap();
     let (one, two) = (target(&gpu, "one", Format::R32Float, 1), target(&gpu, "two", Format::R32Float, 2));
     let rgba = target(&gpu, "rgba", Format::Rgba32Float, 1);
     let mut rec = gpu.recorder("draw").unwrap();
     [&one, &two, &rgba].into_iter().for_each(|image| rec.discard(image));
     let push = push(RED, 0.0, false);
-    for (pipeline, image, layer, size, word) in [
-        (&pipeline, &rgba, None, [5, 5], "Rgba32Float"),
-        (&pipeline, &two, None, [5, 5], "2 layers"),
-        (&pipeline, &two, Some(2), [5, 5], "Some(2)"),
-        (&pipeline, &one, None, [6, 5], "6×5"),
-        (&both, &one, None, [5, 5], "needs 2 layers"),
-        (&both, &two, Some(0), [5, 5], "`layer`"),
+    for (image, layer, at, size, word) in [
+        (&rgba, None, [0; 2], [5, 5], "Rgba32Float"),
+        (&two, None, [0; 2], [5, 5], "2 layers"),
+        (&two, Some(2), [0; 2], [5, 5], "Some(2)"),
+        (&one, None, [0; 2], [6, 5], "6×5"),
+        (&one, None, [0, 3], [5, 3], "5×3 pixels at 0, 3"),
+        (&one, None, [u32::MAX, 0], [5, 5], "do not fit"),
+        (&one, None, [0; 2], [5, 0], "do not fit"),
     ] {
-        let onto = Attachments { colours: &[(image, None)], depth: None, layer, size };
-        let message = problem(rec.draw(pipeline, &[], &push, onto, 3));
+        let onto = Attachments { colours: &[(image, None)], depth: None, layer, at, size };
+        let message = problem(rec.draw(&pipeline, &[], &push, onto, 3));
         assert!(message.contains(word), "{message}");
     }
     assert!(problem(rec.dispatch(&pipeline, &[], &push, [1; 3])).contains("other kind"));
-    let onto = Attachments { colours: &[(&one, None)], depth: None, layer: None, size: [5, 5] };
+    let onto = Attachments { colours: &[(&one, None)], depth: None, layer: None, at: [0; 2], size: [5, 5] };
     let twice = Attachments { colours: &[(&one, None), (&one, None)], ..onto };
     let pair = gpu.graphics(shader, &GraphicsDesc { colours: &[Format::R32Float; 2], ..good }).unwrap();
     assert!(problem(rec.draw(&pair, &[], &push, twice, 3)).contains("at once"));
     rec.draw(&pipeline, &[], &push, onto, 3).unwrap();
     rec.submit_and_wait().unwrap();
-    drop((one, two, rgba, pipeline, both, pair));
+    drop((one, two, rgba, pipeline, pair));
     close(gpu);
 }
 

@@ -254,7 +254,7 @@ fn attachment_to_sampled_and_buffer_to_drawing() {
     let mut rec = gpu.recorder("test").unwrap();
     rec.discard(&picture);
     let target = [(&picture, None)];
-    let onto = Attachments { colours: &target, depth: None, layer: None, size: [4, 3] };
+    let onto = Attachments { colours: &target, depth: None, layer: None, at: [0; 2], size: [4, 3] };
     let look_at = |rec: &mut Recorder| {
         rec.dispatch(&look, &[("flat", Bind::Image(&picture)), bind("b", &out)], &[], [1, 1, 1])
     };

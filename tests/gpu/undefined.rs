@@ -72,7 +72,13 @@ fn depths_outside_0_to_1_are_no_clear_values() {
     let mut rec = gpu.recorder("test").unwrap();
     rec.discard(&target);
     for depth in [f32::NAN, -0.5, 1.5, f32::INFINITY] {
-        let to = Attachments { colours: &[], depth: Some((&target, Some(depth))), layer: None, size: [8, 8] };
+        let to = Attachments {
+            colours: &[],
+            depth: Some((&target, Some(depth))),
+            layer: None,
+            at: [0; 2],
+            size: [8, 8],
+        };
         let draw = message(rec.draw(&pipeline, &[], &[], to, 3));
         let clear = message(rec.clear_image(&target, [depth; 4]));
         for found in [draw, clear] {

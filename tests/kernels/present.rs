@@ -2,7 +2,7 @@
 
 use cao::draw::picture::Picture;
 use cao::draw::present::Present;
-use cao::renderer::{COLOUR, Drawn, Quality, Renderer};
+use cao::renderer::{COLOUR, Drawn, Place, Quality, Renderer, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
 use cao_model::builtin::builtin_box;
 use cao_model::look::Look;
@@ -78,7 +78,14 @@ fn attachments_hold_the_picture_rounded_to_their_format() {
                 rec.discard(&colour);
                 rec.discard(&depth);
                 rec.barrier(&[], &[Access::AttachmentWrite]);
-                renderer.record_draw(rec, &views, &look, &colour, &depth, SIZE).unwrap();
+                renderer
+                    .record_draw(
+                        rec,
+                        &views,
+                        &look,
+                        &Targets::new(&Target::layers(&colour, &depth, views.len()), SIZE),
+                    )
+                    .unwrap();
                 renderer.record_picture(rec, &views, &look, &picture).unwrap();
             });
             for layer in 0..count as u32 {
@@ -113,7 +120,14 @@ fn a_smaller_picture_fills_the_attachments() {
         rec.discard(&colour);
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(rec, &views, look, &colour, &depth, SIZE).unwrap()
+        renderer
+            .record_draw(
+                rec,
+                &views,
+                look,
+                &Targets::new(&Target::layers(&colour, &depth, views.len()), SIZE),
+            )
+            .unwrap()
     };
     // Nothing is known of the first frame.
     let mut drawn = Vec::new();
@@ -179,13 +193,33 @@ fn what_does_not_fit_is_refused_by_name() {
     for (views, size) in [(0, SIZE), (View::MAX + 1, SIZE), (2, [0, 8]), (2, [1 << 20, 8])] {
         assert!(Picture::new(&gpu, size, views).is_err(), "{views} views of {size:?}");
     }
-    // Fewer layers, another format.
+    let picture = Picture::new(&gpu, SIZE, 2).unwrap();
     let present = Present::new(&gpu, Format::Rgba8Unorm).unwrap();
-    for (format, layers) in [(Format::Rgba8Unorm, 2), (COLOUR, 3)] {
-        let [colour, depth] = attachments(&gpu, format, layers);
-        let error = present.record(&mut rec, &picture, SIZE, &colour, &depth).unwrap_err().to_string();
-        assert!(error.contains("present"), "{error}");
+    let [colour, depth] = attachments(&gpu, COLOUR, 2);
+    let [one, _] = attachments(&gpu, COLOUR, 1);
+    let two = Target::layers(&colour, &depth, 2);
+    let beyond = Place { at: [5, 0], ..two[0].colour };
+    let third = Place { layer: 2, ..two[0].colour };
+    [&colour, &depth, &one].into_iter().for_each(|image| rec.discard(image));
+    let scene = Place { image: &one, layer: 0, at: [5, 0] };
+    let behind = Target { scene: Some(scene), ..two[0] };
+    for (target, word) in [
+        (behind, "scene of view 0: 37×29 pixels at 5, 0"),
+        (Target { colour: beyond, ..two[0] }, "colour of view 0: 37×29 pixels at 5, 0"),
+        (Target { colour: third, ..two[0] }, "layer 2"),
+        (Target { depth: Some(two[0].colour), ..two[0] }, "colour format"),
+        (Target { colour: two[0].depth.unwrap(), ..two[0] }, "depth format"),
+        (Target { scene: Some(two[0].colour), ..two[0] }, "all or none"),
+    ] {
+        let other = Target { scene: (word != "all or none").then_some(target.scene).flatten(), ..two[1] };
+        let targets = [target, other];
+        rec.barrier(&[Access::AttachmentWrite], &[Access::AttachmentWrite]);
+        let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&targets, SIZE));
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
     }
-    drop((rec, renderer, picture, present));
+    let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&two[..1], SIZE)).unwrap_err();
+    assert!(error.to_string().contains("1 of them, for 2 views"), "{error}");
+    drop((rec, renderer, picture, present, colour, depth, one));
     close(gpu);
 }

@@ -16,7 +16,7 @@ use cao::field::Field;
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
-use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao::renderer::{COLOUR, Renderer, StereoImage, Target, Targets};
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
@@ -232,6 +232,7 @@ fn eyes_inside_the_volume_and_skew_fields_of_view() {
         tan,
         near_mm,
         far_mm: 90.0,
+        reversed: false,
     };
     let even = Tangents { left: -0.8, right: 0.8, up: 0.7, down: -0.7 };
     let skew = Tangents { left: 0.1, right: 1.3, up: 0.9, down: 0.2 };
@@ -289,7 +290,8 @@ fn no_pixel_is_ever_nan() {
         for position in places {
             for near_mm in [1e-4, 0.5, 31.0] {
                 for orientation in [Quat::IDENTITY, Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)] {
-                    let view = View { position, orientation, tan: even, near_mm, far_mm: 100.0 };
+                    let view =
+                        View { position, orientation, tan: even, near_mm, far_mm: 100.0, reversed: false };
                     let views = [view, View { position: position + Vec3::X, ..view }];
                     let look = Look { step_mm: Some(0.7), ..Look::default() };
                     let (found, _) = renderer.draw(&views, &look, [15, 13]).unwrap();
@@ -303,8 +305,14 @@ fn no_pixel_is_ever_nan() {
             let orientation =
                 Quat::from_rotation_y(between(-3.1, 3.1)) * Quat::from_rotation_x(between(-1.5, 1.5));
             let near_mm = 10.0_f32.powf(between(-4.0, 1.5));
-            let view =
-                View { position, orientation, tan: even, near_mm, far_mm: near_mm * between(1.01, 1e4) };
+            let view = View {
+                position,
+                orientation,
+                tan: even,
+                near_mm,
+                far_mm: near_mm * between(1.01, 1e4),
+                reversed: false,
+            };
             let views = [view, View { position: position + Vec3::Y * 0.1, ..view }];
             let (found, _) = renderer.draw(&views, &Look::default(), [15, 13]).unwrap();
             assert_finite(&found, &format!("seed {SEED} {dims:?} {view:?}"));
@@ -411,7 +419,12 @@ fn views_that_do_not_fit_are_refused_by_name() {
         rec.discard(&colour);
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(&mut rec, views, &look, &colour, &depth, SIZE)?;
+        renderer.record_draw(
+            &mut rec,
+            views,
+            &look,
+            &Targets::new(&Target::layers(&colour, &depth, views.len()), SIZE),
+        )?;
         Ok(rec.submit_and_wait().map(drop)?)
     };
     for (views, layers) in
@@ -531,10 +544,10 @@ impl Stages {
         run(gpu, |rec| {
             rec.discard(colour);
             rec.discard(depth);
-            self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
+            self.frame.record(rec, &self.field, views.into(), look, 1.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
             let band = Band::whole(SIZE);
-            self.raycast.record(rec, bindings, &picture, band, 0..band.tiles()).unwrap();
+            self.raycast.record(rec, bindings, &picture, band, 0..band.tiles(), false).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
             for (n, back) in backs.iter().enumerate() {
                 let image = if n < 2 { colour } else { depth };
@@ -587,8 +600,14 @@ fn sparse_scenes() -> Vec<(&'static str, Volume, Vec<Clip>)> {
 /// Pairs of views on a volume: along axes and brick borders, and from anywhere.
 fn pairs_of_views(random: &mut Random, volume: &Volume) -> Vec<[View; 2]> {
     let even = Tangents { left: -0.4, right: 0.4, up: 0.4, down: -0.4 };
-    let along =
-        |position, orientation| View { position, orientation, tan: even, near_mm: 1.0, far_mm: 200.0 };
+    let along = |position, orientation| View {
+        position,
+        orientation,
+        tan: even,
+        near_mm: 1.0,
+        far_mm: 200.0,
+        reversed: false,
+    };
     let mut pairs = vec![
         // Along an axis through voxel centres: column 23 of 47 and row 20 of 41 have a direction of 0; in a volume of
         // 33 voxels they run in the border of two bricks.

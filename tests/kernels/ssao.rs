@@ -1,6 +1,6 @@
 //! The kernel `ssao` against its twin, on depth images that the renderer drew.
 
-use cao::renderer::{COLOUR, Renderer};
+use cao::renderer::{COLOUR, Renderer, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse};
 use cao_measure::kernels::ssao::Ssao;
 use cao_model::builtin::builtin_box;
@@ -46,7 +46,14 @@ fn on_device(gpu: &Gpu, settings: Settings, azimuth: f32) -> ([View; 2], [Vec<f3
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
         let look = Look::default();
-        renderer.record_draw(rec, &views, &look, &colour, &depth, SIZE).unwrap();
+        renderer
+            .record_draw(
+                rec,
+                &views,
+                &look,
+                &Targets::new(&Target::layers(&colour, &depth, views.len()), SIZE),
+            )
+            .unwrap();
         rec.barrier(&[Access::AttachmentWrite], &[Access::SampledRead, Access::TransferRead]);
         let Settings { radius_mm, samples, bias_mm } = settings;
         for (eye, to) in occlusion.iter().enumerate() {

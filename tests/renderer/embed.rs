@@ -1,7 +1,7 @@
 //! A host that records into its own command buffer gets what `update` and `draw` make, to the bit, and pays nothing for a
 //! frame in which nothing changed.
 
-use cao::renderer::{COLOUR, Renderer};
+use cao::renderer::{COLOUR, Renderer, Target, Targets};
 use cao_gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse, Phase};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
@@ -114,7 +114,13 @@ fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
         rec.discard(&depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
         r.record_update(&mut rec).unwrap();
-        r.record_draw(&mut rec, &views, &Look::default(), &colour, &depth, size).unwrap();
+        r.record_draw(
+            &mut rec,
+            &views,
+            &Look::default(),
+            &Targets::new(&Target::layers(&colour, &depth, views.len()), size),
+        )
+        .unwrap();
         let stages: Vec<_> = rec.submit_and_wait().unwrap().into_iter().map(|t| t.stage).collect();
         assert!(stages.ends_with(&[cao::stages::RAYCAST, cao::stages::PRESENT]), "{stages:?}");
 
@@ -193,7 +199,15 @@ fn what_is_out_of_date_is_neither_drawn_nor_read() {
             let uses = vec![
                 (
                     "record_draw",
-                    said(r.record_draw(&mut rec, &views, &look, &colour, &depth, [8, 8]).map(drop)),
+                    said(
+                        r.record_draw(
+                            &mut rec,
+                            &views,
+                            &look,
+                            &Targets::new(&Target::layers(&colour, &depth, views.len()), [8, 8]),
+                        )
+                        .map(drop),
+                    ),
                 ),
                 ("draw", said(r.draw(&views, &look, [8, 8]).map(drop))),
                 ("verify", said(cao::verify::verify(r, &mut |_| ()).map(drop))),

@@ -2,7 +2,7 @@
 
 use crate::host::Host;
 use crate::scenes::{NAMES, Scene, assert_as_fresh, scene};
-use cao::renderer::{COLOUR, Renderer};
+use cao::renderer::{COLOUR, Renderer, Target, Targets};
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
 use cao_measure::random::Random;
 use cao_model::look::Look;
@@ -40,7 +40,14 @@ impl Window {
         rec.discard(&self.colour);
         rec.discard(&self.depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(rec, &self.views, &self.look, &self.colour, &self.depth, SIZE).map(drop)
+        renderer
+            .record_draw(
+                rec,
+                &self.views,
+                &self.look,
+                &Targets::new(&Target::layers(&self.colour, &self.depth, self.views.len()), SIZE),
+            )
+            .map(drop)
     }
 
     fn read_later(&self, rec: &mut Recorder) {

@@ -110,7 +110,8 @@ fn edge(renderer: &Renderer, look: &Look, inside: f32) -> [[f32; 2]; 2] {
         down: -right(ends[1]),
     };
     let position = Vec3::new(0.0, 0.0, 30.0);
-    let view = View { position, orientation: Quat::IDENTITY, tan, near_mm: 1.0, far_mm: 100.0 };
+    let view =
+        View { position, orientation: Quat::IDENTITY, tan, near_mm: 1.0, far_mm: 100.0, reversed: false };
     let image = renderer.draw(&[view, view], look, [40, 40]).unwrap().0;
     let alpha = |x: usize, y: usize| image.colour[0][40 * y + x][3];
     [[alpha(30, 12), alpha(31, 12)], [alpha(12, 30), alpha(12, 31)]]

@@ -143,6 +143,7 @@ impl Peel {
                     colours: &[(&now.face, Some([0.0; 4]))],
                     depth: Some((&now.depth, Some(EMPTY))),
                     layer: None,
+                    at: [0; 2],
                     size: [edge, edge],
                 },
                 corners.len() as u32,

@@ -1,4 +1,4 @@
-//! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, bands of it, what a frame affords, attachments of hosts.
+//! Pictures: eyes, what there is to frame, ray cast, how far its rays may leap, bands of it, what a frame affords, where hosts want them, and where their own depth ends them.
 
 pub mod band;
 pub mod bounds;
@@ -10,3 +10,5 @@ pub mod filter;
 pub mod picture;
 pub mod present;
 pub mod raycast;
+pub mod scene_depth;
+pub mod target;

@@ -16,7 +16,7 @@ pub const DEPTH: Format = Format::R32Float;
 pub struct Picture {
     /// Premultiplied linear RGBA, [`COLOUR`] or [`HALF_COLOUR`].
     pub colour: Image,
-    /// Vulkan's depth, 0 … 1, [`DEPTH`]; 1 where nothing is drawn.
+    /// Depth by the view's planes, 0 … 1, [`DEPTH`]; that of its far plane where nothing is drawn.
     pub depth: Image,
 }
 

@@ -1,78 +1,109 @@
-//! A picture into a host's attachments: whatever colour format they have, and depth `D32Float`.
+//! A picture into a host's images: whatever colour and depth formats they have.
 //!
-//! In: a [`Picture`], or its upper left. Out: the layers of two attachments, one a view, in one multiview pass. Cost: a read and a write a
-//! pixel; five reads where it is enlarged, colours interpolated and depths taken from the nearest pixel.
+//! In: a [`Picture`], or its upper left. Out: a rectangle a view of colour and, where asked, of depth, each in a pass of its own. Cost: a
+//! read and a write a pixel; five reads where it is enlarged, colours interpolated and depths taken from the nearest pixel.
 
 use crate::Result;
-use crate::draw::eyes::check_count;
 use crate::draw::picture::Picture;
-use cao_gpu::{Attachments, Cull, DepthTest, Format, Gpu, GraphicsDesc, Image, Pipeline, Recorder};
+use crate::draw::target::{Coding, Over, Place, Targets};
+use cao_gpu::{Access, Attachments, Blend, Format, Gpu, GraphicsDesc, Pipeline, Recorder};
 use cao_kernels::present as kernel;
 use cao_model::view::View;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The kernel `present`.
 pub struct Present {
     gpu: Gpu,
-    colour: Format,
-    /// By number of views, less one: a pipeline's view mask is fixed.
-    pipelines: [OnceLock<Pipeline>; View::MAX],
+    /// By what they draw to.
+    pipelines: Mutex<Vec<(Kind, Arc<Pipeline>)>>,
+}
+
+/// What a pipeline is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Colour(Format, Over),
+    Depth(Format),
 }
 
 impl Present {
-    /// Builds the pipeline for two views and a colour attachment of this format.
+    /// Builds the pipelines that replace colours of this format, and depths of `D32Float`.
     pub fn new(gpu: &Gpu, colour: Format) -> Result<Self> {
-        let present = Self { gpu: gpu.clone(), colour, pipelines: Default::default() };
-        present.pipeline(2)?;
+        let present = Self { gpu: gpu.clone(), pipelines: Mutex::default() };
+        present.pipeline(Kind::Colour(colour, Over::Nothing))?;
+        present.pipeline(Kind::Depth(Format::D32Float))?;
         Ok(present)
     }
 
-    /// The pipeline for this many views, built when it is first asked for.
-    fn pipeline(&self, views: usize) -> Result<&Pipeline> {
-        check_count(views)?;
-        let slot = &self.pipelines[views - 1];
-        if let Some(pipeline) = slot.get() {
-            return Ok(pipeline);
+    /// The pipeline for this, built when it is first asked for.
+    fn pipeline(&self, kind: Kind) -> Result<Arc<Pipeline>> {
+        let mut pipelines = self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, pipeline)) = pipelines.iter().find(|(of, _)| *of == kind) {
+            return Ok(pipeline.clone());
         }
-        let pipeline = self.gpu.graphics(
-            &kernel::SHADER,
-            &GraphicsDesc {
-                vertex: "vertex",
-                fragment: "fragment",
-                colours: &[self.colour],
-                depth: Some(Format::D32Float),
-                depth_test: DepthTest::Always,
-                depth_write: true,
-                cull: Cull::None,
-                view_mask: (1 << views) - 1,
-                ..GraphicsDesc::default()
-            },
-        )?;
-        Ok(slot.get_or_init(|| pipeline))
+        let colours = match kind {
+            Kind::Colour(format, _) => vec![format],
+            Kind::Depth(_) => Vec::new(),
+        };
+        let desc = GraphicsDesc { vertex: "vertex", colours: &colours, ..GraphicsDesc::default() };
+        let desc = match kind {
+            Kind::Colour(_, Over::Nothing) => GraphicsDesc { fragment: "colour", ..desc },
+            Kind::Colour(_, Over::Scene) => {
+                GraphicsDesc { fragment: "colour", blend: Blend::Premultiplied, ..desc }
+            }
+            Kind::Depth(format) => {
+                GraphicsDesc { fragment: "depth", depth: Some(format), depth_write: true, ..desc }
+            }
+        };
+        let pipeline = Arc::new(self.gpu.graphics(&kernel::SHADER, &desc)?);
+        pipelines.push((kind, pipeline.clone()));
+        Ok(pipeline)
     }
 
-    /// Draws all views of a picture, of which the upper left was drawn to, `drawn` pixels, over as many pixels as the picture has in the
-    /// upper left of as many layers. A number of views other than two builds its pipeline when it first comes.
+    /// Draws each view of a picture, of which the upper left was drawn to, `drawn` pixels, into its target.
     ///
     /// # Errors
-    /// Attachments of another format, of fewer layers or pixels.
+    /// Targets that have no room, or that nothing can be drawn to.
     pub fn record(
         &self,
         rec: &mut Recorder,
         picture: &Picture,
         drawn: [u32; 2],
-        colour: &Image,
-        depth: &Image,
+        views: &[View],
+        targets: &Targets,
     ) -> Result<()> {
-        let binds = kernel::DrawBindings { colours: &picture.colour, depths: &picture.depth };
-        let attachments = Attachments {
-            colours: &[(colour, Some([0.0; 4]))],
-            depth: Some((depth, Some(1.0))),
-            layer: None,
-            size: picture.size(),
-        };
-        let params = kernel::PresentParams { drawn, size: picture.size() };
-        let push = bytemuck::bytes_of(&params);
-        Ok(rec.draw(self.pipeline(picture.views())?, &binds, push, attachments, kernel::CORNERS)?)
+        for (i, (view, target)) in views.iter().zip(targets.views).enumerate() {
+            let params = |place: Place| kernel::PresentParams {
+                first: place.at,
+                size: targets.size,
+                drawn,
+                view: i as u32,
+                coded: u32::from(targets.coding == Coding::Srgb),
+                nothing: view.depth_of_nothing(),
+                over: u32::from(targets.over == Over::Scene),
+            };
+            let onto = |place: Place| Attachments {
+                colours: &[],
+                depth: None,
+                layer: Some(place.layer),
+                at: place.at,
+                size: targets.size,
+            };
+            if i > 0 {
+                // Views may share a layer.
+                rec.barrier(&[Access::AttachmentWrite], &[Access::AttachmentWrite]);
+            }
+            let place = target.colour;
+            let pipeline = self.pipeline(Kind::Colour(place.image.desc().format, targets.over))?;
+            let (binds, push) = (kernel::VertexColourBindings { colours: &picture.colour }, params(place));
+            let attachments = Attachments { colours: &[(place.image, None)], ..onto(place) };
+            rec.draw(&pipeline, &binds, bytemuck::bytes_of(&push), attachments, kernel::CORNERS)?;
+            if let Some(place) = target.depth {
+                let pipeline = self.pipeline(Kind::Depth(place.image.desc().format))?;
+                let (binds, push) = (kernel::VertexDepthBindings { depths: &picture.depth }, params(place));
+                let attachments = Attachments { depth: Some((place.image, None)), ..onto(place) };
+                rec.draw(&pipeline, &binds, bytemuck::bytes_of(&push), attachments, kernel::CORNERS)?;
+            }
+        }
+        Ok(())
     }
 }

@@ -2,8 +2,8 @@
 //! whole views or a band of their rows.
 //!
 //! `C = Σ_i Π_{j<i} (1 − α_j) α_i L_i`, `α = 1 − exp ∫ ln(1 − a) dt/ℓ`, L by `spirv/shared/shading.wgsl`. In: `volume`, `transfer`,
-//! `ambient` V_AO, `distances`, `bounds`, clips, frame. Out: colour, premultiplied, linear; depth, Vulkan's
-//! 0 … 1, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
+//! `ambient` V_AO, `distances`, `bounds`, clips, frame; where rays end. Out: colour, premultiplied, linear; depth by the
+//! view's planes, where a ray's opacity passes one half. Cost: rays × samples in bricks that show something.
 
 use crate::Result;
 use crate::clip::clips::ClipSet;
@@ -71,7 +71,9 @@ impl Raycast {
     }
 
     /// Writes the pixels of these tiles of a band, whose first row is the picture's; the frame has as many views. No bit of a pixel
-    /// depends on the band.
+    /// depends on the band. With `ended` the picture's depth holds how far each pixel's rays go, as [`SceneDepth`] writes it.
+    ///
+    /// [`SceneDepth`]: crate::draw::scene_depth::SceneDepth
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -79,6 +81,7 @@ impl Raycast {
         picture: &Picture,
         band: Band,
         tiles: Range<u32>,
+        ended: bool,
     ) -> Result<()> {
         let b = bindings;
         let params = kernel::RaycastParams {
@@ -88,7 +91,7 @@ impl Raycast {
             rows: band.rows,
             first_tile: tiles.start,
             tiles: tiles.len() as u32,
-            pad: Default::default(),
+            ended: u32::from(ended),
         };
         let [x, y, _] = row_of_groups(tiles.len() as u32);
         let groups = [x, y, picture.views() as u32];

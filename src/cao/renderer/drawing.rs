@@ -3,36 +3,51 @@
 use super::Renderer;
 use crate::draw::band::Band;
 use crate::draw::budget::{Drawn, Quality};
+use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::draw::raycast::Bindings;
+use crate::draw::target::Targets;
 use crate::stages;
 use crate::{Error, Result};
-use cao_gpu::{Access, Image, Recorder};
+use cao_gpu::{Access, Recorder};
 use cao_model::look::Look;
-use cao_model::view::View;
 use std::ops::Range;
 use std::sync::PoisonError;
 
+/// What is drawn into a picture.
+#[derive(Clone, Copy)]
+pub(super) struct Shot<'a> {
+    pub views: Views<'a>,
+    pub look: &'a Look,
+    pub picture: &'a Picture,
+    /// Where it goes from there, and what ends its rays.
+    pub targets: Option<&'a Targets<'a>>,
+}
+
 impl Renderer {
-    /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
+    /// Records one to four views ([`View::MAX`](cao_model::view::View::MAX)), known now or [late](crate::draw::eyes::LateViews), into a picture of as many, whose content before is given up; copies, kernels and shaders
     /// can read it afterwards. Refuses while the ambient volume is out of date.
     ///
     /// Returns what is drawn: with [`Look::budget_ms`] that may be a part of the picture, its upper left, and samples may lie farther apart;
     /// else it is all of it. [`Self::drew`] takes it with the time that it took.
-    pub fn record_picture(
+    pub fn record_picture<'a>(
         &self,
         rec: &mut Recorder,
-        views: &[View],
+        views: impl Into<Views<'a>>,
         look: &Look,
         picture: &Picture,
     ) -> Result<Drawn> {
         self.current()?;
         look.check()?;
         let drawn = self.affordable(look, picture.size());
-        let look = Look { step_mm: Some(drawn.step_mm), ..*look };
-        let band = Band::whole(drawn.size);
-        self.record_tiles(rec, views, &look, picture, band, 0..band.tiles())?;
+        self.record_shot(rec, &Shot { views: views.into(), look, picture, targets: None }, drawn)?;
         Ok(drawn)
+    }
+
+    fn record_shot(&self, rec: &mut Recorder, shot: &Shot, drawn: Drawn) -> Result<()> {
+        let look = Look { step_mm: Some(drawn.step_mm), ..*shot.look };
+        let band = Band::whole(drawn.size);
+        self.record_tiles(rec, &Shot { look: &look, ..*shot }, band, 0..band.tiles())
     }
 
     /// What the look's budget allows of a picture of this size.
@@ -61,15 +76,15 @@ impl Renderer {
     pub(super) fn record_tiles(
         &self,
         rec: &mut Recorder,
-        views: &[View],
-        look: &Look,
-        picture: &Picture,
+        shot: &Shot,
         band: Band,
         tiles: Range<u32>,
     ) -> Result<()> {
         self.current()?;
-        if picture.views() != views.len() {
-            let problem = format!("has room for {} views, given are {}", picture.views(), views.len());
+        let Shot { views, look, picture, .. } = *shot;
+        let count = views.planned().len();
+        if picture.views() != count {
+            let problem = format!("has room for {} views, given are {count}", picture.views());
             return Err(Error::refused("picture", problem));
         }
         let (subject, fields) = (&self.subject, self.ambient.fields());
@@ -78,13 +93,13 @@ impl Renderer {
         }
         rec.barrier(
             &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead, Access::StorageWrite],
-            &[Access::StorageWrite],
+            &[Access::StorageRead, Access::StorageWrite],
         );
         if tiles.start == 0 {
             rec.discard(&picture.colour);
             rec.discard(&picture.depth);
-            rec.barrier(&[], &[Access::StorageWrite]);
         }
+        let ended = self.record_scenes(rec, shot, band.size)?;
         rec.stage(stages::RAYCAST)?;
         let bindings = Bindings {
             field: &subject.field,
@@ -95,7 +110,7 @@ impl Renderer {
             clips: &subject.clip_set,
             frame: &self.frame,
         };
-        self.raycast.record(rec, bindings, picture, band, tiles)?;
+        self.raycast.record(rec, bindings, picture, band, tiles, ended)?;
         rec.end_stage()?;
         rec.barrier(
             &[Access::StorageWrite],
@@ -104,29 +119,57 @@ impl Renderer {
         Ok(())
     }
 
-    /// Records the same into as many layers of attachments: `colour` of the renderer's format, `depth` of `D32Float`. The picture between
-    /// is allocated when a size or a number of views first comes; numbers other than two build a pipeline then. Where a look's budget allows
-    /// less than all pixels, the attachments are filled all the same, colours interpolated, depths those of the nearest pixel.
-    pub fn record_draw(
+    /// Where rays end at what the host has drawn; whether they do.
+    fn record_scenes(&self, rec: &mut Recorder, shot: &Shot, drawn: [u32; 2]) -> Result<bool> {
+        let Some(targets) = shot.targets else { return Ok(false) };
+        let scenes = targets.views.iter().filter_map(|target| target.scene);
+        if scenes.clone().next().is_none() {
+            return Ok(false);
+        }
+        rec.stage(stages::SCENE_DEPTH)?;
+        for (i, (view, scene)) in shot.views.planned().iter().zip(scenes).enumerate() {
+            self.scene_depth.record(rec, (i as u32, view), scene, targets.size, shot.picture, drawn)?;
+            rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+        }
+        rec.end_stage()?;
+        Ok(true)
+    }
+
+    /// Records the same into a host's images ([`Targets`]), in front of its scene and ended by it. The images must be held
+    /// ([`Recorder::acquire`]) or have a layout, and barriers must order what the host did with them before [`Access::AttachmentWrite`], of a
+    /// scene's depth [`Access::SampledRead`]; afterwards likewise.
+    ///
+    /// The picture between is allocated when a size or a number of views first comes; what draws to formats is built when they first
+    /// come. Where a look's budget allows less than all pixels, the rectangles are filled all the same, colours interpolated, depths those of the
+    /// nearest pixel.
+    ///
+    /// # Errors
+    /// As many targets as views; images without room, formats that cannot be drawn to, a device's queue that draws nothing.
+    pub fn record_draw<'a>(
         &self,
         rec: &mut Recorder,
-        views: &[View],
+        views: impl Into<Views<'a>>,
         look: &Look,
-        colour: &Image,
-        depth: &Image,
-        size: [u32; 2],
+        targets: &Targets,
     ) -> Result<Drawn> {
         self.current()?;
+        look.check()?;
+        let (views, size) = (views.into(), targets.size);
+        let planned = views.planned();
+        targets.check(planned.len())?;
         let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
-        let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
+        let fits = |picture: &Picture| picture.size() == size && picture.views() == planned.len();
         let picture = match presented.take().filter(fits) {
             Some(picture) => picture,
-            None => Picture::new(&self.subject.gpu, size, views.len())?,
+            None => Picture::new(&self.subject.gpu, size, planned.len())?,
         };
         let picture = presented.insert(picture);
-        let drawn = self.record_picture(rec, views, look, picture)?;
+        let drawn = self.affordable(look, size);
+        self.record_shot(rec, &Shot { views, look, picture, targets: Some(targets) }, drawn)?;
+        // A scene's depth may be where theirs goes.
+        rec.barrier(&[Access::SampledRead], &[Access::AttachmentWrite]);
         rec.stage(stages::PRESENT)?;
-        self.present.record(rec, picture, drawn.size, colour, depth)?;
+        self.present.record(rec, picture, drawn.size, planned, targets)?;
         rec.end_stage()?;
         Ok(drawn)
     }

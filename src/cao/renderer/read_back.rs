@@ -1,7 +1,9 @@
 //! Pictures on the device's own queue, read back, whole or band by band.
 
 use super::Renderer;
+use super::drawing::Shot;
 use crate::draw::band::{Band, Bands, PIXEL, afford};
+use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::drive::{Slice, add};
 use crate::{Error, Result};
@@ -22,7 +24,7 @@ pub struct StereoImage<const VIEWS: usize = 2> {
     pub size: [u32; 2],
     /// Of each view: premultiplied linear RGBA, rows from the top.
     pub colour: [Vec<[f32; 4]>; VIEWS],
-    /// Of each view: Vulkan depth, 1 where nothing is drawn.
+    /// Of each view: depth by its planes, that of the far one where nothing is drawn.
     pub depth: [Vec<f32>; VIEWS],
 }
 
@@ -146,7 +148,13 @@ impl<'a> Drawing<'a> {
             let tiles = self.slice.of_these(band.tiles() - done);
             let mut rec = self.renderer.subject.gpu.recorder("draw")?;
             let range = done..done + tiles;
-            self.renderer.record_tiles(&mut rec, self.views, self.look, &self.picture, band, range)?;
+            let shot = Shot {
+                views: Views::Now(self.views),
+                look: self.look,
+                picture: &self.picture,
+                targets: None,
+            };
+            self.renderer.record_tiles(&mut rec, &shot, band, range)?;
             done += tiles;
             if done == band.tiles() {
                 self.record_read_back(&mut rec, band)?;

@@ -8,7 +8,7 @@ use super::rendered::{change_to, with_radius};
 use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values, surface_look};
 use crate::Result;
 use crate::kernels::ssao::Ssao;
-use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao::renderer::{COLOUR, Renderer, StereoImage, Target, Targets};
 use cao_gpu::{
     Access, Buffer, BufferUse, Format, Image, ImageDesc, ImageKind, ImageUse, Phase, Stage, Timings,
 };
@@ -98,7 +98,8 @@ impl<'a> ImageSpace<'a> {
         rec.discard(&self.colour);
         rec.discard(&self.depth);
         rec.barrier(&[], &[Access::AttachmentWrite]);
-        self.renderer.record_draw(&mut rec, views, &surface_look(), &self.colour, &self.depth, size)?;
+        let targets = Target::layers(&self.colour, &self.depth, views.len());
+        self.renderer.record_draw(&mut rec, views, &surface_look(), &Targets::new(&targets, size))?;
         rec.submit_and_wait()?;
 
         let mut rec = gpu.recorder("image-space occlusion")?;

@@ -340,6 +340,7 @@ mod tests {
             tan: Tangents { left: -0.3, right: 0.4, up: 0.35, down: -0.25 },
             near_mm: 1.0,
             far_mm: 200.0,
+            reversed: false,
         }
     }
 
