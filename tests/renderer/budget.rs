@@ -50,7 +50,7 @@ struct Seen {
 /// an older one than before; what pictures show of anything else is the newest; what is settled is what a fresh renderer has.
 fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Seen {
     let mut random = Random::new(seed);
-    let mut scene = scene_up_to(25, &mut random, name, method);
+    let mut scene = scene_up_to(21, &mut random, name, method);
     // One renderer under budgets, and one that does everything at once.
     let make =
         || Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
@@ -63,9 +63,12 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
     for number in 0..frames {
         let mut edited = number == 0;
         for _ in 0..[0, 0, 1, 1, 2][random.below(5) as usize] {
+            // Another method takes a while to make: rarely.
+            let kind = [0, 2, 4, 7, 8, 9][random.below(6) as usize];
+            let kind = if random.below(40) == 0 { 6 } else { kind };
             let (mut again, mut same) = (scene.clone(), random.clone());
-            again.edit(&mut same, &mut at_once);
-            let edit = scene.edit(&mut random, &mut renderer);
+            again.edit_of(kind, &mut same, &mut at_once);
+            let edit = scene.edit_of(kind, &mut random, &mut renderer);
             edited = true;
             // Another method had its own volume.
             if edit.ends_with("and back") {
@@ -86,8 +89,8 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
         let budget = match random.below(8) {
             0 => Budget::Bricks(u32::MAX),
             1 | 2 => Budget::Ms(random.between(0.1, 20.0)),
-            3 => Budget::Bricks(1),
-            _ => Budget::Bricks(1 + random.below(9) as u32),
+            3 | 4 => Budget::Bricks(1),
+            _ => Budget::Bricks(1 + random.below(5) as u32),
         };
         let (updated, timings) = frame(gpu, &mut renderer, budget);
         if let Budget::Bricks(most) = budget {
@@ -115,7 +118,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
         if updated.opens() {
             *if volumes.len() == 1 { &mut found.whole } else { &mut found.spanned } += 1;
         }
-        if random.below(12) == 0 {
+        if random.below(20) == 0 {
             assert!(depths(&renderer, &scene) == depths(&at_once, &scene), "picture {}", context());
         }
         // Times come up to three frames late, or not at all.
@@ -130,7 +133,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
             assert_eq!(renderer.stale(), Stale::default());
             assert!(bits(&renderer) == bits(&at_once), "settled {}", context());
             found.settled += 1;
-            if random.below(64) == 0 {
+            if random.below(96) == 0 {
                 assert_as_fresh(&scene, &renderer, &scene.renderer(gpu), &context);
             }
         } else {
@@ -169,7 +172,7 @@ fn no_frame_shows_a_torn_volume_and_what_settles_is_exact() {
         let found = frames(&gpu, NAMES[case % NAMES.len()], method, 91 + case as u64, count);
         // All of it happened.
         let Seen { whole, spanned, behind, settled } = found;
-        assert!(whole > 20 && spanned > 20 && behind > 40 && settled > 20, "{}: {found:?}", method.name());
+        assert!(whole > 10 && spanned > 10 && behind > 40 && settled > 20, "{}: {found:?}", method.name());
     }
     close(gpu);
 }

@@ -59,7 +59,8 @@ impl Scene {
         self.edit_of(kind, random, renderer)
     }
 
-    fn edit_of(&mut self, kind: u64, random: &mut Random, renderer: &mut Renderer) -> String {
+    /// One whose kind is a number below 10; some of 6 are another method and back, which makes that method.
+    pub fn edit_of(&mut self, kind: u64, random: &mut Random, renderer: &mut Renderer) -> String {
         let pick = |random: &mut Random, n: usize| random.below(n as u64) as usize;
         match kind {
             // The transfer function, as a ramp or as labels of which some are shown.
