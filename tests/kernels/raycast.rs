@@ -474,7 +474,7 @@ impl Stages {
         let bounds = Bounds::new(gpu).unwrap();
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
-        stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, 50.0, MAPS).unwrap();
+        stages.clips.prepare(gpu, &peel, &dilate, clips, Some(2.0), 50.0, MAPS).unwrap();
         let volumes = &stages.volumes;
         run(gpu, |rec| {
             stages.transfer.record(rec, transfer).unwrap();

@@ -2,6 +2,7 @@
 //! nothing to say, and works on as soon as it is told something sound. A run is short and always the same; CONTRIBUTING.md has the
 //! command for a long one.
 
+use cao::Budget;
 use cao::renderer::{COLOUR, LateViews, Over, Renderer, Target, Targets, Views};
 use cao_gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse};
 use cao_model::builtin::builtin_box;
@@ -34,6 +35,7 @@ enum Call {
     Update,
     Record,
     RecordAndDrop,
+    Within(Budget, f64),
     Invalidate,
     Draw(StereoRig, Look, [u32; 2]),
     /// Into images of a host, of 16×16 pixels; whether views come late.
@@ -128,6 +130,11 @@ fn call() -> impl Strategy<Value = Call> {
     let size = select(vec![[0, 4], [1, 1], [9, 7], [16, 16], [u32::MAX, 1], [1, u32::MAX]]);
     let (rig2, look2, size2) = (rig.clone(), look.clone(), size.clone());
     let over = select(vec![Over::Nothing, Over::Scene]);
+    let budget = prop_oneof![
+        (0..9_u32).prop_map(Budget::Bricks),
+        Just(Budget::Bricks(u32::MAX)),
+        length().prop_map(Budget::Ms)
+    ];
     let place = prop::array::uniform3(prop_oneof![8 => 0..9_u32, 1 => Just(u32::MAX)]);
     prop_oneof![
         2 => transfer().prop_map(Call::Transfer),
@@ -138,6 +145,7 @@ fn call() -> impl Strategy<Value = Call> {
         4 => Just(Call::Update),
         1 => Just(Call::Record),
         1 => Just(Call::RecordAndDrop),
+        3 => (budget, any::<f64>()).prop_map(|(budget, ms)| Call::Within(budget, ms)),
         1 => Just(Call::Invalidate),
         3 => (rig, look, size).prop_map(|(rig, look, size)| Call::Draw(rig, look, size)),
         2 => (rig2, look2, size2, over, any::<bool>())
@@ -188,6 +196,12 @@ fn act(
             let recorded = renderer.record_update(&mut gpu.recorder("calls")?);
             renderer.invalidate();
             recorded?;
+        }
+        Call::Within(budget, ms) => {
+            let mut rec = gpu.recorder("calls")?;
+            let updated = renderer.record_update_within(&mut rec, *budget)?;
+            rec.submit_and_wait()?;
+            renderer.updated(&updated, *ms)?;
         }
         Call::Invalidate => renderer.invalidate(),
         Call::Draw(rig, look, size) => drop(renderer.draw(&rig.views(1.0, 0.1, 100.0)?, look, *size)?),

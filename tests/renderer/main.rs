@@ -2,6 +2,7 @@
 
 mod adopt;
 mod bands;
+mod budget;
 mod calls;
 mod consistency;
 mod contextual;
