@@ -18,11 +18,11 @@ pub enum CaoResult {
     BadHandle = 2,
     /// A handle of what was freed.
     Freed = 3,
-    /// Another thread is in a call with the same renderer, recording or whatever is to be freed. Try again.
+    /// Another thread is in a call with the same renderer or recording. Try again.
     Busy = 4,
-    /// It is needed still: a device with objects, an image with recordings. Free those first.
+    /// It is needed still: a device by what is on it, an image by recordings, anything by a call of another thread. Free those first.
     InUse = 5,
-    /// Not now: a recording that has ended, or not, or failed; an ambient volume that is out of date.
+    /// Not now: a recording that has ended, or not, or failed; an ambient volume that is out of date; an image that is not acquired.
     WrongOrder = 6,
     /// A struct's size is none that this library knows, or a number of bytes is not what the format asks for.
     WrongSize = 7,
@@ -59,6 +59,8 @@ impl From<cao_model::Error> for Failure {
     fn from(error: cao_model::Error) -> Self {
         let code = match error {
             cao_model::Error::Limit { .. } => CaoResult::Limit,
+            // How the renderer refuses to show what it has not updated.
+            cao_model::Error::Config { ref what, .. } if what == "ambient volume" => CaoResult::WrongOrder,
             _ => CaoResult::BadValue,
         };
         Self { code, message: error.to_string() }
@@ -72,7 +74,8 @@ impl From<cao_gpu::Error> for Failure {
             cao_gpu::Error::Device { .. } => CaoResult::Device,
             cao_gpu::Error::Memory { .. } => CaoResult::OutOfMemory,
             cao_gpu::Error::Vulkan { .. } => CaoResult::Vulkan,
-            cao_gpu::Error::Hazard { .. } => CaoResult::Internal,
+            // Ours are in place; what a host can leave out is to acquire an image.
+            cao_gpu::Error::Hazard { .. } => CaoResult::WrongOrder,
             _ => CaoResult::BadValue,
         };
         Self { code, message: error.to_string() }
