@@ -58,6 +58,7 @@ impl Host {
             physical_device: self.physical,
             device: self.device.clone(),
             queue_family: self.family,
+            compute_only: false,
             queue: Some(self.queue),
         }
     }

@@ -1,7 +1,7 @@
 // Stage 6 of CAO section 3.5: the volume by ray casting, all views in one dispatch. Front to back, a segment between two samples at a time,
 // through which the value is taken as linear and its opacity integrated exactly; steps halve where a segment's opacity says little of its
-// parts. Leaps over bricks that show nothing, clipped parts skipped by the shadow test of section 3.2, ambient factor from V_AO where a
-// segment's light comes from.
+// parts. Leaps over bricks that show nothing, clipped parts skipped by the shadow test of section 3.2, ambient factor from V_AO in front of
+// where a segment's light comes from.
 
 #include "shared/transfer.wgsl"
 
@@ -26,6 +26,7 @@
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
 #include "shared/eyes.wgsl"
+#include "shared/air.wgsl"
 
 struct RaycastParams {
     // pixels of one view

@@ -100,12 +100,3 @@ fn ray_through(eye: Eye, uv: vec2<f32>) -> Ray {
         frame.spacing.w / length(direction),
     );
 }
-
-// Ambient factor at an index position rounded to 1/256 voxel, the resolution of texture filters on GPUs: the field itself,
-// sampled on a finer lattice than the voxels'. The two eyes' rays meet a point with different rounding, far less than
-// 1/256 voxel, so that both read the very same bits at every point but those on a border between two such cells (about
-// 0.3 % of arbitrary points); there they read values 1/256 voxel apart, which differ by the field's change over that way.
-fn ambient_at(position: vec3<f32>) -> f32 {
-    let snapped = round(position * 256.0) / 256.0;
-    return textureSampleLevel(ambient, edge, (snapped + 0.5) / frame.dims.xyz, 0.0).r;
-}

@@ -1,9 +1,10 @@
 // The light that a visible place of a ray sends towards the eye: ambient, Lambert's diffuse and Blinn's specular part.
 //
-//   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain V_AO, 1) where it is shown, else 1;  A' the same where it multiplies all light
+//   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain a, 1) where it is shown, else 1;  A' the same where it multiplies all light
 //
 // Where a surface is, d = max(n.l, 0) and s = d max(n.h, 0)^shininess; where none is, d = 1/2 and s = 0. What a surface is: `steepness`.
-// Just behind a cut or a face of the volume, n is the normal of what cut. Cost: a read, and 26 more where n is the gradient's.
+// Just behind a cut or a face of the volume, n is the normal of what cut. a: `air.wgsl`.
+// Cost: 26 reads where n is the gradient's, 14 for a.
 
 #include "shared/gradient.wgsl"
 #include "shared/clip_normal.wgsl"

@@ -11,6 +11,7 @@
 @group(0) @binding(6) var<storage, read_write> seen: AllSeen;
 
 #include "shared/eyes.wgsl"
+#include "shared/air.wgsl"
 
 struct ConsistencyParams {
     count: u32,

@@ -40,6 +40,7 @@ mod read_back;
 
 pub use crate::draw::band::Bands;
 pub use crate::draw::budget::{Drawn, Quality};
+pub use crate::draw::eyes::{LateViews, Views};
 pub use crate::draw::picture::COLOUR;
 pub use crate::draw::target::{Coding, Over, Place, Target, Targets};
 pub use read_back::StereoImage;

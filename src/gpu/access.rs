@@ -26,6 +26,8 @@ pub enum Access {
     AttachmentWrite,
     /// Mapped memory read by the program after the commands have run.
     HostRead,
+    /// Mapped memory written by the program before they run.
+    HostWrite,
 }
 
 impl Access {
@@ -51,12 +53,16 @@ impl Access {
                     | A::DEPTH_STENCIL_ATTACHMENT_WRITE,
             ),
             Access::HostRead => (S::HOST, A::HOST_READ),
+            Access::HostWrite => (S::HOST, A::HOST_WRITE),
         }
     }
 
     /// Whether it changes memory.
     pub fn writes(self) -> bool {
-        matches!(self, Access::TransferWrite | Access::StorageWrite | Access::AttachmentWrite)
+        matches!(
+            self,
+            Access::TransferWrite | Access::StorageWrite | Access::AttachmentWrite | Access::HostWrite
+        )
     }
 
     /// One bit for each access.
@@ -64,9 +70,11 @@ impl Access {
         1 << self as u16
     }
 
-    /// Pipeline stages and access masks of several accesses together.
-    pub(crate) fn union(list: &[Access]) -> (S, A) {
-        list.iter().fold((S::NONE, A::NONE), |(stages, masks), access| {
+    /// Pipeline stages and access masks of several accesses together; of those that draw only where something can.
+    pub(crate) fn union(list: &[Access], graphics: bool) -> (S, A) {
+        let drawing = |access: Access| matches!(access, Access::GraphicsRead | Access::AttachmentWrite);
+        let list = list.iter().filter(|access| graphics || !drawing(**access));
+        list.fold((S::NONE, A::NONE), |(stages, masks), access| {
             let row = access.row();
             (stages | row.0, masks | row.1)
         })
@@ -79,8 +87,10 @@ mod tests {
 
     #[test]
     fn several_accesses_unite_stages_and_masks() {
-        let (stages, masks) = Access::union(&[Access::StorageWrite, Access::TransferRead]);
+        let list = [Access::StorageWrite, Access::TransferRead, Access::GraphicsRead];
+        let (stages, masks) = Access::union(&list[..2], true);
         assert_eq!(stages, S::COMPUTE_SHADER | S::ALL_TRANSFER);
         assert_eq!(masks, A::SHADER_STORAGE_WRITE | A::TRANSFER_READ);
+        assert_eq!(Access::union(&list, false), (stages, masks), "no stage that the queue does not have");
     }
 }

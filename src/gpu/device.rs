@@ -40,14 +40,18 @@ pub struct OpenOptions {
 pub struct Adopted {
     /// Loader.
     pub entry: ash::Entry,
-    /// Instance of Vulkan 1.3 or newer.
+    /// Instance of Vulkan 1.1 or newer. One below 1.3 hides from the device what is of 1.3: then it needs the extensions of
+    /// [`feature::BEFORE_1_3`](crate::feature::BEFORE_1_3) and their features.
     pub instance: ash::Instance,
     /// Device that `device` was made of.
     pub physical_device: vk::PhysicalDevice,
     /// Device with [`Gpu::required_extensions`] and [`Gpu::required_features`] enabled.
     pub device: ash::Device,
-    /// Family of the queue that will run the recorded commands; must do graphics and compute.
+    /// Family of the queue that will run the recorded commands; must do compute. Where it does no graphics, nothing can be drawn into
+    /// attachments, which the host does itself with what [`Recorder`](crate::Recorder) makes, and meshes cannot clip; both are refused by name.
     pub queue_family: u32,
+    /// Do without graphics even where the family has them.
+    pub compute_only: bool,
     /// A queue of that family lent to the calls that say they use one (uploads, read-backs, new clip meshes): during such a call
     /// nobody else may use it. `None`: those calls refuse, and recording into the host's command buffers is all there is.
     pub queue: Option<vk::Queue>,
@@ -57,12 +61,16 @@ pub struct Adopted {
 pub(crate) struct Inner {
     pub memory: ManuallyDrop<Memory>,
     pub device: ash::Device,
+    /// Calls of Vulkan 1.3, by whichever name the device has them.
+    pub v13: ash::DeviceFnV1_3,
     pub push_descriptor: ash::khr::push_descriptor::Device,
     /// Names and labels, if the instance has them.
     pub debug: Option<ash::ext::debug_utils::Device>,
     /// Locked for submission; `None` for an adopted device, whose queue is the host's.
     pub queue: Option<Mutex<vk::Queue>>,
     pub queue_family: u32,
+    /// Commands may draw.
+    pub graphics: bool,
     /// Valid bits of a timestamp; 0 if the queue has none.
     pub timestamp_mask: u64,
     pub info: DeviceInfo,
@@ -209,7 +217,9 @@ impl Gpu {
         });
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family, 0) };
-        let parts = Parts { entry, instance, physical, info, device, family, queue: Some(queue), debug, log };
+        let queue = Some(queue);
+        let parts =
+            Parts { entry, instance, physical, info, device, family, queue, debug, log, compute_only: false };
         // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
         parts.build(Some(Owned { messenger }))
     }
@@ -245,12 +255,13 @@ impl Gpu {
     /// calls that say so, on the queue that the host lent; without one, [`Gpu::recorder`] refuses.
     ///
     /// # Safety
-    /// The handles must be valid and belong together, be made with Vulkan 1.3 or newer and with [`Gpu::required_extensions`] and
-    /// [`Gpu::required_features`], and stay alive until this `Gpu` and all that was made with it are dropped. A lent queue must not be used by others during calls that
+    /// The handles must be valid and belong together, be made with what [`Gpu::required`] lists ([`Gpu::required_extensions`],
+    /// [`Gpu::required_features`]), and stay alive until this `Gpu` and all that was made with it are dropped. A lent queue must not be used by others during calls that
     /// use it.
     ///
     /// # Errors
-    /// [`Error::Device`] if the physical device lacks something that is needed.
+    /// [`Error::Device`] if the physical device lacks something that is needed, the device was made without an extension, or the queue's
+    /// family does not compute. Whether features were enabled nobody can ask a device: [`Gpu::on_trust`] lists what was not checked.
     pub unsafe fn adopt(host: Adopted) -> Result<Self> {
         let info = DeviceInfo::of(&host.instance, host.physical_device);
         choose(std::slice::from_ref(&info), None)?;
@@ -264,8 +275,24 @@ impl Gpu {
             queue: host.queue,
             debug: false,
             log: ValidationLog::default(),
+            compute_only: host.compute_only,
         };
         parts.build(None)
+    }
+
+    /// What an adopted device must be made with, in words, each with the reason.
+    pub fn required() -> Vec<String> {
+        feature::required()
+    }
+
+    /// What is used where a device has it, in words, each with what happens without.
+    pub fn optional() -> Vec<String> {
+        feature::optional()
+    }
+
+    /// What [`Gpu::adopt`] could not check and took on trust, in words; empty for a device of our own.
+    pub fn on_trust(&self) -> Vec<String> {
+        if self.0.owned.is_some() { Vec::new() } else { feature::on_trust() }
     }
 
     /// Device extensions that an adopted device must have.
@@ -338,16 +365,51 @@ struct Parts {
     queue: Option<vk::Queue>,
     debug: bool,
     log: ValidationLog,
+    compute_only: bool,
+}
+
+/// Calls of Vulkan 1.3, and whether the device has all that is used: an instance below 1.3 hides them behind the names that they had as
+/// extensions.
+fn calls(instance: &ash::Instance, device: &ash::Device) -> Result<ash::DeviceFnV1_3> {
+    let address = |name: &CStr| {
+        // SAFETY: instance and device are alive and belong together.
+        unsafe { instance.get_device_proc_addr(device.handle(), name.as_ptr()) }
+    };
+    let either = |name: &CStr| {
+        let extension = || CString::new([name.to_bytes(), b"KHR"].concat()).ok();
+        address(name).or_else(|| extension().and_then(|name| address(&name)))
+    };
+    for (name, of) in feature::CALLS {
+        if either(name).is_none() {
+            let problem = format!(
+                "the device has no {}; make it with {of}, see Gpu::required_extensions and feature::BEFORE_1_3",
+                name.to_string_lossy()
+            );
+            return Err(Error::Device { problem });
+        }
+    }
+    Ok(ash::DeviceFnV1_3::load(|name| either(name).map_or(std::ptr::null(), |call| call as *const _)))
 }
 
 impl Parts {
     fn build(self, owned: Option<Owned>) -> Result<Gpu> {
-        let Self { entry, instance, physical, info, device, family, queue, debug, log } = self;
+        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only } = self;
         // SAFETY: `physical` was enumerated from this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+        let does = families.get(family as usize).map_or(vk::QueueFlags::empty(), |f| f.queue_flags);
         let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits);
-        let memory = match Memory::new(&instance, physical, &device) {
-            Ok(memory) => memory,
+        let computes = || match does.contains(vk::QueueFlags::COMPUTE) {
+            true => Ok(()),
+            false => {
+                let problem =
+                    format!("queue family {family} of {} does not compute; choose one that does", info.name);
+                Err(Error::Device { problem })
+            }
+        };
+        let made = computes()
+            .and_then(|()| Ok((calls(&instance, &device)?, Memory::new(&instance, physical, &device)?)));
+        let (v13, memory) = match made {
+            Ok(made) => made,
             Err(error) => {
                 if let Some(owned) = owned {
                     // SAFETY: nothing was made of the device, and it is ours.
@@ -362,6 +424,8 @@ impl Parts {
             debug: debug.then(|| ash::ext::debug_utils::Device::new(&instance, &device)),
             queue: queue.map(Mutex::new),
             queue_family: family,
+            graphics: does.contains(vk::QueueFlags::GRAPHICS) && !compute_only,
+            v13,
             timestamp_mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0),
             info,
             physical,

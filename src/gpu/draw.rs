@@ -43,6 +43,16 @@ impl Recorder {
         attachments: Attachments<'_>,
         vertices: u32,
     ) -> Result<()> {
+        if !self.gpu.graphics {
+            return Err(Error::Config {
+                what: pipeline.0.name.clone(),
+                problem: format!(
+                    "draws, which queue family {} does not do here; adopt a device with a queue of graphics, or do without clip meshes \
+                     and present pictures yourself (record_picture)",
+                    self.gpu.queue_family
+                ),
+            });
+        }
         let binds = binds.list();
         let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::GRAPHICS, &binds, push)?;
         let Some(targets) = &pipeline.0.targets else { return Ok(()) };
@@ -87,11 +97,11 @@ impl Recorder {
         let device = &self.gpu.device;
         // SAFETY: `cmd` is recording, outside a rendering pass; attachments fit the pipeline and are kept; all state is set.
         unsafe {
-            device.cmd_begin_rendering(self.cmd, &rendering);
+            (self.gpu.v13.cmd_begin_rendering)(self.cmd, &rendering);
             device.cmd_set_viewport(self.cmd, 0, &[viewport]);
             device.cmd_set_scissor(self.cmd, 0, &[area]);
             device.cmd_draw(self.cmd, vertices, 1, 0, 0);
-            device.cmd_end_rendering(self.cmd);
+            (self.gpu.v13.cmd_end_rendering)(self.cmd);
         }
         Ok(())
     }

@@ -200,7 +200,7 @@ impl Recorder {
             .subresource_range(image.0.all())];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
         // SAFETY: `cmd` is recording, outside a rendering pass; the image is alive by the promise of `adopt_image`, and kept.
-        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
+        unsafe { (self.gpu.v13.cmd_pipeline_barrier2)(self.cmd, &info) };
         self.count(0, 1);
         self.keep(image.0.clone());
     }

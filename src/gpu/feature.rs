@@ -9,11 +9,66 @@ pub const API_VERSION: u32 = vk::API_VERSION_1_3;
 /// Device extensions in use.
 pub const EXTENSIONS: &[&CStr] = &[ash::khr::push_descriptor::NAME];
 
+/// Extensions that a device needs beside whose instance is of Vulkan 1.1 or 1.2: what 1.3 took up from them is hidden there. Their features
+/// `synchronization2` and `dynamicRendering` are enabled by their own structs.
+pub const BEFORE_1_3: &[&CStr] = &[
+    ash::khr::synchronization2::NAME,
+    ash::khr::dynamic_rendering::NAME,
+    ash::khr::depth_stencil_resolve::NAME,
+    ash::khr::create_renderpass2::NAME,
+];
+
+/// Calls in use that are not of Vulkan 1.1, and what brings them.
+pub(crate) const CALLS: &[(&CStr, &str)] = &[
+    (c"vkCmdPushDescriptorSetKHR", "VK_KHR_push_descriptor"),
+    (c"vkCmdPipelineBarrier2", "Vulkan 1.3 or VK_KHR_synchronization2"),
+    (c"vkCmdWriteTimestamp2", "Vulkan 1.3 or VK_KHR_synchronization2"),
+    (c"vkQueueSubmit2", "Vulkan 1.3 or VK_KHR_synchronization2"),
+    (c"vkCmdBeginRendering", "Vulkan 1.3 or VK_KHR_dynamic_rendering"),
+];
+
+/// What is used where a device has it, and what happens without.
+const OPTIONAL: &[(&str, &str)] = &[
+    ("filtering of R16_UNORM", "16-bit values become floats, twice the memory"),
+    ("storage images of R16_UNORM", "no rays by brick; the methods cao and lao remain"),
+    (
+        "8-bit filtering that keeps fractions",
+        "values of 8 bits are interpolated in the ray cast, which takes longer",
+    ),
+    ("timestamps of the queue", "stages have no times"),
+    ("a queue of graphics", "pictures only, which the host presents; no clip meshes"),
+    ("VK_EXT_debug_utils, on a device of our own", "objects have no names in a debugger"),
+];
+
+/// The required, in words.
+pub(crate) fn required() -> Vec<String> {
+    let mut words = vec!["a device of Vulkan 1.3, an instance of 1.1 or newer (all that follows)".to_owned()];
+    words.extend(EXTENSIONS.iter().map(|e| format!("extension {} (bindings)", e.to_string_lossy())));
+    words.extend(FEATURES.iter().map(|f| format!("feature {} ({})", f.name, f.why)));
+    let before = BEFORE_1_3.iter().map(|e| e.to_string_lossy()).collect::<Vec<_>>().join(", ");
+    words.push(format!("with an instance below 1.3 also {before} (what 1.3 took up from them)"));
+    words
+}
+
+/// The optional, in words.
+pub(crate) fn optional() -> Vec<String> {
+    OPTIONAL.iter().map(|(what, without)| format!("{what} (without: {without})")).collect()
+}
+
+/// What no call tells of a device.
+pub(crate) fn on_trust() -> Vec<String> {
+    let features = FEATURES.iter().map(|f| format!("feature {} was enabled ({})", f.name, f.why));
+    let others =
+        ["handles belong together and outlive what is made of them", "nobody else uses a lent queue"];
+    features.chain(others.map(str::to_owned)).collect()
+}
+
 /// Feature structs of one device, to be asked for or enabled.
 #[derive(Default)]
 pub struct Features {
     core: vk::PhysicalDeviceFeatures,
-    v13: vk::PhysicalDeviceVulkan13Features<'static>,
+    synchronization: vk::PhysicalDeviceSynchronization2Features<'static>,
+    rendering: vk::PhysicalDeviceDynamicRenderingFeatures<'static>,
 }
 
 impl Features {
@@ -26,11 +81,16 @@ impl Features {
         features
     }
 
-    /// The structs linked into a chain that `vkCreateDevice` and `vkGetPhysicalDeviceFeatures2` take.
+    /// The structs linked into a chain that `vkCreateDevice` and `vkGetPhysicalDeviceFeatures2` take. Who has a
+    /// `VkPhysicalDeviceVulkan13Features` there sets `synchronization2` and `dynamicRendering` in that instead: Vulkan allows one of the two.
     pub fn chain(&mut self) -> vk::PhysicalDeviceFeatures2<'_> {
         // A chain of an earlier call would dangle into a moved struct.
-        self.v13.p_next = std::ptr::null_mut();
-        vk::PhysicalDeviceFeatures2::default().features(self.core).push_next(&mut self.v13)
+        self.synchronization.p_next = std::ptr::null_mut();
+        self.rendering.p_next = std::ptr::null_mut();
+        vk::PhysicalDeviceFeatures2::default()
+            .features(self.core)
+            .push_next(&mut self.synchronization)
+            .push_next(&mut self.rendering)
     }
 
     /// Asks a device for what it can do.
@@ -61,11 +121,11 @@ pub struct Feature {
 
 /// Required features. All are in every desktop driver of Vulkan 1.3 and in lavapipe.
 pub const FEATURES: &[Feature] = &[
-    Feature { name: "synchronization2", why: "barriers", field: |f| &mut f.v13.synchronization2 },
+    Feature { name: "synchronization2", why: "barriers", field: |f| &mut f.synchronization.synchronization2 },
     Feature {
         name: "dynamicRendering",
         why: "drawing without render pass objects",
-        field: |f| &mut f.v13.dynamic_rendering,
+        field: |f| &mut f.rendering.dynamic_rendering,
     },
     Feature {
         name: "shaderStorageImageExtendedFormats",

@@ -65,12 +65,13 @@ pub enum DeviceKind {
 impl DeviceInfo {
     pub(crate) fn of(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
-        let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+        // Those of Vulkan 1.3 under the names that instances of 1.1 know too.
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance4Properties::default();
         let mut chain = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut driver)
-            .push_next(&mut v11)
-            .push_next(&mut v13);
+            .push_next(&mut subgroup)
+            .push_next(&mut maintenance);
         // SAFETY: `device` was enumerated from `instance`; the chained structs outlive the call. Devices of older
         // versions, which do not know some, leave those zero.
         unsafe { instance.get_physical_device_properties2(device, &mut chain) };
@@ -106,7 +107,7 @@ impl DeviceInfo {
             max_image_2d: limits.max_image_dimension2_d,
             max_image_3d: limits.max_image_dimension3_d,
             max_image_layers: limits.max_image_array_layers,
-            max_buffer: v13.max_buffer_size,
+            max_buffer: maintenance.max_buffer_size,
             max_storage_range: limits.max_storage_buffer_range.into(),
             max_uniform_range: limits.max_uniform_buffer_range.into(),
             max_workgroups: limits.max_compute_work_group_count,
@@ -115,7 +116,7 @@ impl DeviceInfo {
             storage_alignment: limits.min_storage_buffer_offset_alignment,
             uniform_alignment: limits.min_uniform_buffer_offset_alignment,
             timestamp_period_ns: limits.timestamp_period.into(),
-            subgroup: v11.subgroup_size,
+            subgroup: subgroup.subgroup_size,
             device_memory: memory
                 .memory_heaps_as_slice()
                 .iter()

@@ -121,7 +121,7 @@ impl Recorder {
         // SAFETY: `cmd` is recording (ours, or by the promise of `record_into`), the image is alive and kept.
         unsafe {
             let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
-            self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info);
+            (self.gpu.v13.cmd_pipeline_barrier2)(self.cmd, &info);
         }
         self.count(0, 1);
         self.hazards.discard(image.0.id);
@@ -131,7 +131,8 @@ impl Recorder {
     /// One global memory barrier: every access of the kinds `before` recorded so far happens before every access of the kinds `after`
     /// recorded later.
     pub fn barrier(&mut self, before: &[Access], after: &[Access]) {
-        let ((src_stage, src), (dst_stage, dst)) = (Access::union(before), Access::union(after));
+        let union = |list| Access::union(list, self.gpu.graphics);
+        let ((src_stage, src), (dst_stage, dst)) = (union(before), union(after));
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(src_stage)
             .src_access_mask(src)
@@ -151,7 +152,7 @@ impl Recorder {
     fn memory_barrier(&self, barrier: &[vk::MemoryBarrier2<'_>]) {
         let info = vk::DependencyInfo::default().memory_barriers(barrier);
         // SAFETY: `cmd` is recording (ours, or by the promise of `record_into`), outside a rendering pass.
-        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
+        unsafe { (self.gpu.v13.cmd_pipeline_barrier2)(self.cmd, &info) };
     }
 
     /// Runs `groups` workgroups `[x, y, z]`. `push` is the immediate block, of exactly the size that the shader declares.
@@ -302,7 +303,7 @@ impl Recorder {
             device.end_command_buffer(self.cmd).map_err(vulkan("vkEndCommandBuffer", &self.name))?;
             let fence = own.commands.fence;
             let locked = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            let submitted = device.queue_submit2(*locked(), &submit, fence);
+            let submitted = (self.gpu.v13.queue_submit2)(*locked(), 1, submit.as_ptr(), fence).result();
             let waited = submitted.map_err(vulkan("vkQueueSubmit2", &self.name)).and_then(|()| {
                 device
                     .wait_for_fences(&[fence], true, u64::MAX)

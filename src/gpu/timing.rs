@@ -180,7 +180,7 @@ impl Stages {
             let query = 2 * (stage % STAGES_PER_POOL) + which;
             // SAFETY: `cmd` is recording by the caller's promise, the pool has this query and it was reset.
             unsafe {
-                self.gpu.device.cmd_write_timestamp2(cmd, vk::PipelineStageFlags2::ALL_COMMANDS, *pool, query)
+                (self.gpu.v13.cmd_write_timestamp2)(cmd, vk::PipelineStageFlags2::ALL_COMMANDS, *pool, query)
             };
         }
     }

@@ -243,8 +243,8 @@ pub struct ImageReference {
 }
 
 /// The image reference: the ray cast of [`cao_twin::draw::raycast`] with the plan's steps on the smallest spacing, the ambient
-/// factor of each of its samples evaluated by the ambient integral of `opacity`, V_o, around that very point. For small images: every sample of
-/// every ray costs what a voxel costs. The frame's own `ambient` and `step_mm` are not used. Uses the device's queue and waits for it.
+/// factor of each of its samples evaluated by the ambient integral of `opacity`, V_o, around the very point that the sample shows. For small images: every sample of
+/// every ray costs what a voxel costs. The frame's own `ambient` only says where the air of a surface is, and its `step_mm` is not used. Uses the device's queue and waits for it.
 #[expect(clippy::too_many_arguments, reason = "scene, lengths and settings, each named once")]
 pub fn image(
     gpu: &Gpu,

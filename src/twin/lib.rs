@@ -63,6 +63,12 @@ impl Grid {
         std::array::from_fn(|i| world[i] / self.spacing[i] + (self.dims[i] as f64 - 1.0) / 2.0)
     }
 
+    /// The field at a voxel, continued outside by its edge voxels.
+    fn clamped(&self, field: &[f32], voxel: [i64; 3]) -> f64 {
+        let nearest = std::array::from_fn(|i| voxel[i].clamp(0, self.dims[i] as i64 - 1) as usize);
+        f64::from(field[self.index(nearest)])
+    }
+
     /// The voxels that share a face, an edge or a corner with `voxel` (at most 26).
     pub fn neighbours(&self, voxel: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
         let (dims, centre) = (self.dims, voxel.map(|c| c as isize));
@@ -85,10 +91,7 @@ pub fn trilinear(grid: &Grid, field: &[f32], position: [f64; 3]) -> f64 {
 
 /// Trilinear value of a field at index coordinates, continued outside by its edge voxels.
 pub fn trilinear_clamped(grid: &Grid, field: &[f32], position: [f64; 3]) -> f64 {
-    blend(position, |voxel| {
-        let nearest = std::array::from_fn(|i| voxel[i].clamp(0, grid.dims[i] as i64 - 1) as usize);
-        f64::from(field[grid.index(nearest)])
-    })
+    blend(position, |voxel| grid.clamped(field, voxel))
 }
 
 /// Mean of the eight voxels around a position, weighted by 1 − distance along each axis.

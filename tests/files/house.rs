@@ -543,16 +543,20 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 4] = [
+const WITHOUT_TWIN: [(&str, &str); 5] = [
     ("filter", "asks a device what its filter does; the answer is in the comparison"),
     ("present", "copies texels; the test has what each format makes of them"),
+    ("scene_depth", "inverts a view's depth; the test has a sphere that it traces"),
     ("compare", "counts differing bits of two volumes; tests plant differences and count them"),
     ("consistency", "reads what each eye reads; tests compare it with the volume itself"),
 ];
 
 /// Kernels that need a whole renderer for their test, and where it is.
-const TESTED_IN: [(&str, &str); 2] =
-    [("compare", "tests/renderer/exactness.rs"), ("consistency", "tests/renderer/consistency.rs")];
+const TESTED_IN: [(&str, &str); 3] = [
+    ("scene_depth", "tests/renderer/external.rs"),
+    ("compare", "tests/renderer/exactness.rs"),
+    ("consistency", "tests/renderer/consistency.rs"),
+];
 
 /// Rooms whose host sides live elsewhere.
 const HOSTS_OF: [(&str, &str); 1] = [("measure", "src/measure/kernels")];

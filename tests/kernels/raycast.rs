@@ -544,7 +544,7 @@ impl Stages {
         run(gpu, |rec| {
             rec.discard(colour);
             rec.discard(depth);
-            self.frame.record(rec, &self.field, views, look, 1.0).unwrap();
+            self.frame.record(rec, &self.field, views.into(), look, 1.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
             let band = Band::whole(SIZE);
             self.raycast.record(rec, bindings, &picture, band, 0..band.tiles(), false).unwrap();

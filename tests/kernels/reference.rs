@@ -223,6 +223,7 @@ impl Scene {
     fn reference(
         &self,
         gpu: &Gpu,
+        ambient: &[f32],
         radius_mm: f64,
         directions: u32,
         steps_per_voxel: u32,
@@ -230,7 +231,7 @@ impl Scene {
         let plan = Plan { directions, steps_per_voxel, max_voxels: usize::MAX };
         reference::image(
             gpu,
-            &self.frame(&[], 1.0),
+            &self.frame(ambient, 1.0),
             &self.opacity,
             &self.view,
             SIZE,
@@ -259,34 +260,34 @@ fn the_image_reference_is_the_ray_cast_with_the_integral_at_each_sample() {
     // Without a radius nothing is occluded: the ordinary ray cast of a volume of ones.
     let ones = vec![1.0; scene.grid.len()];
     let bare = raycast(&scene.frame(&ones, 0.25), &scene.view, SIZE);
-    let found = scene.reference(&gpu, 0.0, 10, 4);
+    let found = scene.reference(&gpu, &ones, 0.0, 10, 4);
     assert!(apart(&found.image, &bare) < 1e-6);
     assert_eq!(found.image.depth, bare.depth);
 
-    let found = scene.reference(&gpu, RADIUS, 60, 4);
-    let fine = scene.frame(&[], 0.25);
+    let integral = Integral::ambient(RADIUS, 0.5, 4, 60, 1.0);
+    let evaluate =
+        |p: &Vec<_>| twin::measure::reference::reference(&scene.grid, &scene.opacity, &integral, 1.0, p);
+    let centres: Vec<[f64; 3]> =
+        (0..scene.grid.len()).map(|i| scene.grid.voxel(i).map(|c| c as f64)).collect();
+    let volume: Vec<f32> = evaluate(&centres).into_iter().map(|a| a as f32).collect();
+    let found = scene.reference(&gpu, &volume, RADIUS, 60, 4);
+    let fine = scene.frame(&volume, 0.25);
     let pixels: Vec<usize> = (0..SIZE[0] * SIZE[1]).collect();
     let positions = ambient_positions(&fine, &scene.view, SIZE, &pixels);
     assert_eq!(found.points, positions.iter().map(Vec::len).sum::<usize>());
     assert_eq!(found.covered, positions.iter().filter(|p| !p.is_empty()).count());
     assert!(found.covered > 30);
-    let integral = Integral::ambient(RADIUS, 0.5, 4, 60, 1.0);
-    let evaluate =
-        |p: &Vec<_>| twin::measure::reference::reference(&scene.grid, &scene.opacity, &integral, 1.0, p);
     let ambient: Vec<Vec<f64>> = positions.iter().map(evaluate).collect();
     let expected = raycast_lit(&fine, &scene.view, SIZE, &pixels, &ambient);
     assert!(apart(&found.image, &expected) < IMAGE_ROUNDING, "{}", apart(&found.image, &expected));
 
     // A volume of the same integral, interpolated, looks alike and is not the same.
-    let centres: Vec<[f64; 3]> =
-        (0..scene.grid.len()).map(|i| scene.grid.voxel(i).map(|c| c as f64)).collect();
-    let volume: Vec<f32> = evaluate(&centres).into_iter().map(|a| a as f32).collect();
-    let from_volume = raycast(&scene.frame(&volume, 0.25), &scene.view, SIZE);
+    let from_volume = raycast(&fine, &scene.view, SIZE);
     let difference = apart(&found.image, &from_volume);
     assert!(difference > 100.0 * IMAGE_ROUNDING && difference < 0.1, "{difference}");
 
     // More directions and shorter steps, less change.
-    let better = scene.reference(&gpu, RADIUS, 120, 8);
+    let better = scene.reference(&gpu, &volume, RADIUS, 120, 8);
     assert!(better.convergence.rmse < found.convergence.rmse, "{:?}", better.convergence);
     assert!(found.convergence.rmse < 0.05 && better.convergence.count > 100);
     close(gpu);

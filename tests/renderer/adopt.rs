@@ -1,6 +1,7 @@
 //! A host with its own Vulkan: its device is used, its command buffer recorded into, and its handles survive.
 
 use crate::host::Host;
+use ash::vk;
 use cao::renderer::{Renderer, Target, Targets};
 use cao_gpu::Access::*;
 use cao_gpu::Error;
@@ -152,4 +153,79 @@ fn recordings_end_the_way_they_began() {
         matches!(rec.finish(), Err(Error::Config { problem, .. }) if problem.contains("submit_and_wait"))
     );
     cao_testing::close(gpu);
+}
+
+/// An instance of Vulkan 1.1 hides what is of 1.3; a queue that is not to draw still makes pictures, and refuses meshes and attachments
+/// by name. What is drawn is the same to the bit.
+#[test]
+fn older_instances_and_queues_without_graphics_give_the_same_picture() {
+    let volume = cao_formats::open("builtin:fruit:16").unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let views = StereoRig::framing(volume.size_mm(), 30.0, 20.0).views(1.0, 1.0, 500.0).unwrap();
+    let mut pictures = Vec::new();
+    for (version, compute_only) in
+        [(vk::API_VERSION_1_3, false), (vk::API_VERSION_1_3, true), (vk::API_VERSION_1_1, false)]
+    {
+        let host = Host::of_version(version);
+        let gpu = host.adopted_for(Some(host.queue), compute_only);
+        assert!(gpu.on_trust().iter().any(|what| what.contains("synchronization2")), "{:?}", gpu.on_trust());
+        let setup = Setup::new(volume.min_spacing());
+        let mut renderer =
+            Renderer::new(&gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
+        renderer.set_clips(&[Clip::remove(Shape::Torus)]).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+        let (image, timings) = renderer.draw(&views, &Look::default(), [16, 16]).unwrap();
+        assert!(timings.iter().any(|t| t.stage.name == "raycast"), "{timings:?}");
+        pictures.push(image.colour);
+        let mesh = Clip::remove(Shape::Mesh(cao_testing::convex()));
+        let clipped = renderer.set_clips(&[mesh]);
+        assert_eq!(clipped.is_err(), compute_only);
+        if let Err(error) = clipped {
+            let error = error.to_string();
+            assert!(
+                error.contains("peel") && error.contains("graphics") && error.contains("clip meshes"),
+                "{error}"
+            );
+            let usage = ImageUse::ATTACHMENT;
+            let desc = ImageDesc {
+                dims: [16, 16, 1],
+                layers: 2,
+                format: Format::Rgba16Float,
+                kind: ImageKind::D2,
+                usage,
+            };
+            let colour = gpu.image("swapchain", &desc).unwrap();
+            let depth = gpu.image("swapchain", &ImageDesc { format: Format::D32Float, ..desc }).unwrap();
+            renderer.update(&mut |_| ()).unwrap();
+            let mut rec = gpu.recorder("refused").unwrap();
+            let targets = Target::layers(&colour, &depth, 2);
+            let drawn =
+                renderer.record_draw(&mut rec, &views, &Look::default(), &Targets::new(&targets, [16, 16]));
+            assert!(drawn.unwrap_err().to_string().contains("record_picture"));
+        }
+        drop(renderer);
+        drop(gpu);
+        host.destroy();
+    }
+    assert!(pictures[0] == pictures[1] && pictures[0] == pictures[2]);
+    assert!(pictures[0][0].iter().any(|c| c[3] > 0.5));
+}
+
+/// A device without an extension, and one that hides what is needed, are refused by name.
+#[test]
+fn a_device_that_lacks_a_call_is_refused_by_its_name() {
+    for (version, without, word) in [
+        (vk::API_VERSION_1_3, ash::khr::push_descriptor::NAME, "VK_KHR_push_descriptor"),
+        (vk::API_VERSION_1_1, ash::khr::synchronization2::NAME, "VK_KHR_synchronization2"),
+        (vk::API_VERSION_1_1, ash::khr::dynamic_rendering::NAME, "VK_KHR_dynamic_rendering"),
+    ] {
+        let host = Host::without(version, Some(without));
+        let refused = host.try_adopted().map(drop).unwrap_err().to_string();
+        assert!(refused.contains(word), "{refused}");
+        host.destroy();
+    }
+    let words = [Gpu::required(), Gpu::optional()].concat().join("; ");
+    for word in ["VK_KHR_push_descriptor", "dynamicRendering", "barriers", "R16_UNORM", "without"] {
+        assert!(words.contains(word), "{words}");
+    }
 }

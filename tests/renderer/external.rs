@@ -4,7 +4,7 @@ use crate::host::Host;
 use crate::host_image::HostImage;
 use ash::vk;
 use cao::draw::picture::Picture;
-use cao::renderer::{COLOUR, Coding, Over, Place, Renderer, Target, Targets};
+use cao::renderer::{COLOUR, Coding, LateViews, Over, Place, Renderer, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageState, ImageUse, Lent};
 use cao_model::builtin::builtin_box;
 use cao_model::look::{Look, Shading};
@@ -545,6 +545,56 @@ fn images_that_are_not_held_or_not_lent_are_refused_by_name() {
     }
     drop((lent, ours, renderer));
     image.destroy(&host);
+    drop(gpu);
+    host.destroy();
+}
+
+/// A frame is recorded with a guess of where the head will be and submitted to wait; then the head is known, and its views are drawn, in its
+/// light, to the bit.
+#[test]
+fn views_may_come_after_the_frame_was_submitted() {
+    let host = Host::new();
+    let gpu = host.adopted(Some(host.queue));
+    let renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
+    let (guess, known) = (eyes(&volume, 30.0), eyes(&volume, 48.0));
+    let look = Look::default();
+    let late = LateViews::new(&gpu, &guess, &look).unwrap();
+    let pictures = [0, 1, 2].map(|_| Picture::new(&gpu, SIZE, 2).unwrap());
+    // SAFETY: the device has timeline semaphores.
+    let semaphore = unsafe {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default()
+            .semaphore_type(vk::SemaphoreType::TIMELINE)
+            .initial_value(3);
+        let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        host.device().create_semaphore(&create, None).unwrap()
+    };
+    let cmd = host.begin();
+    // SAFETY: the command buffer is recording and submitted once below; the `Recorded` is kept until then.
+    let mut rec = unsafe { gpu.record_into(cmd) };
+    renderer.record_picture(&mut rec, &late, &look, &pictures[0]).unwrap();
+    let recorded = rec.finish().unwrap();
+    host.submit_after(cmd, semaphore, 4);
+    late.write(&known, &look).unwrap();
+    // SAFETY: the semaphore is alive, and its value lower.
+    unsafe {
+        let signal = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(4);
+        host.device().signal_semaphore(&signal).unwrap();
+        host.device().queue_wait_idle(host.queue).unwrap();
+    }
+    run(&gpu, |rec| {
+        renderer.record_picture(rec, &known, &look, &pictures[1]).unwrap();
+        renderer.record_picture(rec, &guess, &look, &pictures[2]).unwrap();
+    });
+    let [found, expected, guessed] = pictures.each_ref().map(|picture| texels(&gpu, &picture.colour));
+    assert!(found == expected && found != guessed);
+
+    let error = |views: &[View]| late.write(views, &look).unwrap_err().to_string();
+    assert!(error(&known[..1]).contains("than planned"));
+    assert!(error(&known.map(|view| View { far_mm: 9e3, ..view })).contains("planes"));
+    // SAFETY: nothing waits for it.
+    unsafe { host.device().destroy_semaphore(semaphore, None) };
+    drop((recorded, late, pictures, renderer));
     drop(gpu);
     host.destroy();
 }

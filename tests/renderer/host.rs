@@ -1,6 +1,7 @@
 //! A program with a Vulkan of its own, as small as one can be.
 
 use ash::vk;
+use cao_gpu::feature::BEFORE_1_3;
 use cao_gpu::{Adopted, Gpu};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -33,10 +34,20 @@ pub struct Host {
 
 impl Host {
     pub fn new() -> Self {
+        Self::of_version(vk::API_VERSION_1_3)
+    }
+
+    /// With an instance of this version.
+    pub fn of_version(version: u32) -> Self {
+        Self::without(version, None)
+    }
+
+    /// The same, and a device without an extension, its feature, and those that need it.
+    pub fn without(version: u32, extension: Option<&CStr>) -> Self {
         // SAFETY: the calls follow Vulkan's rules; everything passed lives during its call.
         unsafe {
             let entry = ash::Entry::load().unwrap();
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+            let application = vk::ApplicationInfo::default().api_version(version);
             let layers: Vec<_> = cao_testing::validated()
                 .then_some(c"VK_LAYER_KHRONOS_validation".as_ptr())
                 .into_iter()
@@ -67,9 +78,26 @@ impl Host {
                 .unwrap();
             let queues =
                 [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-            let extensions: Vec<_> = Gpu::required_extensions().iter().map(|name| name.as_ptr()).collect();
+            let before = if version < vk::API_VERSION_1_3 { BEFORE_1_3 } else { &[] };
+            // Of the host's own use.
+            let mut semaphores =
+                vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
+            let timeline = (version < vk::API_VERSION_1_2).then_some(ash::khr::timeline_semaphore::NAME);
+            let extensions: Vec<_> = Gpu::required_extensions()
+                .iter()
+                .chain(before)
+                .copied()
+                .chain(timeline)
+                .filter(|name| Some(*name) != extension)
+                .map(CStr::as_ptr)
+                .collect();
             let mut features = Gpu::required_features();
-            let mut chain = features.chain();
+            let mut chain = match extension {
+                None => features.chain(),
+                // Its feature is nothing that the device knows then.
+                Some(_) => vk::PhysicalDeviceFeatures2::default(),
+            }
+            .push_next(&mut semaphores);
             let create = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
                 .enabled_extension_names(&extensions)
@@ -84,7 +112,17 @@ impl Host {
 
     /// Its device, with or without its queue.
     pub fn adopted(&self, queue: Option<vk::Queue>) -> Gpu {
+        self.adopted_for(queue, false)
+    }
+
+    /// The same, for compute alone if asked.
+    pub fn adopted_for(&self, queue: Option<vk::Queue>, compute_only: bool) -> Gpu {
+        self.adopt(queue, compute_only).unwrap()
+    }
+
+    fn adopt(&self, queue: Option<vk::Queue>, compute_only: bool) -> cao_gpu::Result<Gpu> {
         let adopted = Adopted {
+            compute_only,
             entry: self.entry.clone(),
             instance: self.instance.clone(),
             physical_device: self.physical,
@@ -93,7 +131,12 @@ impl Host {
             queue,
         };
         // SAFETY: the handles belong together and have what is required; tests destroy the host last and lend its queue to one thread.
-        unsafe { Gpu::adopt(adopted) }.unwrap()
+        unsafe { Gpu::adopt(adopted) }
+    }
+
+    /// Whether its device is accepted.
+    pub fn try_adopted(&self) -> cao_gpu::Result<Gpu> {
+        self.adopt(None, false)
     }
 
     /// Its device.
@@ -141,6 +184,22 @@ impl Host {
             let submit = [vk::SubmitInfo::default().command_buffers(list)];
             self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
             self.device.queue_wait_idle(self.queue).unwrap();
+        }
+    }
+
+    /// Submits them, to run when the semaphore has this value.
+    pub fn submit_after(&self, cmd: vk::CommandBuffer, semaphore: vk::Semaphore, value: u64) {
+        // SAFETY: the command buffer is recording and of this device, the semaphore alive.
+        unsafe {
+            self.device.end_command_buffer(cmd).unwrap();
+            let (waits, values, commands) = ([semaphore], [value], [cmd]);
+            let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().wait_semaphore_values(&values);
+            let submit = [vk::SubmitInfo::default()
+                .wait_semaphores(&waits)
+                .wait_dst_stage_mask(&[vk::PipelineStageFlags::ALL_COMMANDS])
+                .command_buffers(&commands)
+                .push_next(&mut timeline)];
+            self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
         }
     }
 

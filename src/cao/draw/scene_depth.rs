@@ -25,7 +25,7 @@ impl SceneDepth {
     /// `size` pixels.
     ///
     /// # Errors
-    /// [`cao_model::Error::Config`] for a rectangle that is not inside of its image; images that shaders cannot read.
+    /// Images that shaders cannot read.
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -36,19 +36,6 @@ impl SceneDepth {
         drawn: [u32; 2],
     ) -> Result<()> {
         let (index, view) = view;
-        let [width, height, _] = scene.image.desc().dims;
-        let fits = |at: u32, size: u32, of: u32| at.checked_add(size).is_some_and(|end| end <= of);
-        if !fits(scene.at[0], size[0], width) || !fits(scene.at[1], size[1], height) {
-            let problem = format!(
-                "{}×{} pixels at {}, {} do not fit image {} of {width}×{height}",
-                size[0],
-                size[1],
-                scene.at[0],
-                scene.at[1],
-                scene.image.name()
-            );
-            return Err(crate::Error::refused("depth of the scene", problem));
-        }
         let [a, b] = view.depth_terms();
         let params = kernel::SceneDepthParams {
             first: scene.at,

@@ -1,5 +1,6 @@
 //! Where views are drawn: a host's layers, images, or rectangles of one image.
 
+use crate::{Error, Result};
 use cao_gpu::Image;
 
 /// A rectangle of one layer of an image.
@@ -73,5 +74,41 @@ impl<'a> Targets<'a> {
     /// Rectangles of this size that are replaced, by linear numbers.
     pub fn new(views: &'a [Target<'a>], size: [u32; 2]) -> Self {
         Self { views, size, over: Over::Nothing, coding: Coding::Linear }
+    }
+
+    /// Refuses targets that do not suit so many views, before anything is recorded.
+    pub(crate) fn check(&self, views: usize) -> Result<()> {
+        let refuse = |problem: String| Err(Error::refused("targets", problem));
+        if self.views.len() != views {
+            return refuse(format!("{} of them, for {views} views", self.views.len()));
+        }
+        let scenes = self.views.iter().filter(|target| target.scene.is_some()).count();
+        if scenes != 0 && scenes != views {
+            return refuse("some views have a scene's depth and some have none; give all or none".into());
+        }
+        let [width, height] = self.size;
+        for (i, target) in self.views.iter().enumerate() {
+            let places = [("colour", Some(target.colour)), ("depth", target.depth), ("scene", target.scene)];
+            for (what, place) in places.into_iter().filter_map(|(what, place)| Some((what, place?))) {
+                let ([x, y], image) = (place.at, place.image.desc());
+                let fits = |at: u32, size: u32, of: u32| {
+                    size > 0 && at.checked_add(size).is_some_and(|end| end <= of)
+                };
+                if !fits(x, width, image.dims[0])
+                    || !fits(y, height, image.dims[1])
+                    || place.layer >= image.layers
+                {
+                    return refuse(format!(
+                        "{what} of view {i}: {width}×{height} pixels at {x}, {y} of layer {} are not inside image {} of {}×{} in {} layers",
+                        place.layer,
+                        place.image.name(),
+                        image.dims[0],
+                        image.dims[1],
+                        image.layers
+                    ));
+                }
+            }
+        }
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::Renderer;
 use crate::draw::band::Band;
 use crate::draw::budget::{Drawn, Quality};
+use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::draw::raycast::Bindings;
 use crate::draw::target::Targets;
@@ -10,14 +11,13 @@ use crate::stages;
 use crate::{Error, Result};
 use cao_gpu::{Access, Recorder};
 use cao_model::look::Look;
-use cao_model::view::View;
 use std::ops::Range;
 use std::sync::PoisonError;
 
 /// What is drawn into a picture.
 #[derive(Clone, Copy)]
 pub(super) struct Shot<'a> {
-    pub views: &'a [View],
+    pub views: Views<'a>,
     pub look: &'a Look,
     pub picture: &'a Picture,
     /// Where it goes from there, and what ends its rays.
@@ -25,22 +25,22 @@ pub(super) struct Shot<'a> {
 }
 
 impl Renderer {
-    /// Records one to four views ([`View::MAX`]) into a picture of as many, whose content before is given up; copies, kernels and shaders
+    /// Records one to four views ([`View::MAX`](cao_model::view::View::MAX)), known now or [late](crate::draw::eyes::LateViews), into a picture of as many, whose content before is given up; copies, kernels and shaders
     /// can read it afterwards. Refuses while the ambient volume is out of date.
     ///
     /// Returns what is drawn: with [`Look::budget_ms`] that may be a part of the picture, its upper left, and samples may lie farther apart;
     /// else it is all of it. [`Self::drew`] takes it with the time that it took.
-    pub fn record_picture(
+    pub fn record_picture<'a>(
         &self,
         rec: &mut Recorder,
-        views: &[View],
+        views: impl Into<Views<'a>>,
         look: &Look,
         picture: &Picture,
     ) -> Result<Drawn> {
         self.current()?;
         look.check()?;
         let drawn = self.affordable(look, picture.size());
-        self.record_shot(rec, &Shot { views, look, picture, targets: None }, drawn)?;
+        self.record_shot(rec, &Shot { views: views.into(), look, picture, targets: None }, drawn)?;
         Ok(drawn)
     }
 
@@ -82,8 +82,9 @@ impl Renderer {
     ) -> Result<()> {
         self.current()?;
         let Shot { views, look, picture, .. } = *shot;
-        if picture.views() != views.len() {
-            let problem = format!("has room for {} views, given are {}", picture.views(), views.len());
+        let count = views.planned().len();
+        if picture.views() != count {
+            let problem = format!("has room for {} views, given are {count}", picture.views());
             return Err(Error::refused("picture", problem));
         }
         let (subject, fields) = (&self.subject, self.ambient.fields());
@@ -121,18 +122,12 @@ impl Renderer {
     /// Where rays end at what the host has drawn; whether they do.
     fn record_scenes(&self, rec: &mut Recorder, shot: &Shot, drawn: [u32; 2]) -> Result<bool> {
         let Some(targets) = shot.targets else { return Ok(false) };
-        let scenes = || targets.views.iter().map(|target| target.scene);
-        if !scenes().any(|scene| scene.is_some()) {
+        let scenes = targets.views.iter().filter_map(|target| target.scene);
+        if scenes.clone().next().is_none() {
             return Ok(false);
         }
-        if !scenes().all(|scene| scene.is_some()) {
-            return Err(Error::refused(
-                "targets",
-                "some views have a scene's depth and some have none; give all or none",
-            ));
-        }
         rec.stage(stages::SCENE_DEPTH)?;
-        for (i, (view, scene)) in shot.views.iter().zip(scenes().flatten()).enumerate() {
+        for (i, (view, scene)) in shot.views.planned().iter().zip(scenes).enumerate() {
             self.scene_depth.record(rec, (i as u32, view), scene, targets.size, shot.picture, drawn)?;
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         }
@@ -150,25 +145,23 @@ impl Renderer {
     ///
     /// # Errors
     /// As many targets as views; images without room, formats that cannot be drawn to, a device's queue that draws nothing.
-    pub fn record_draw(
+    pub fn record_draw<'a>(
         &self,
         rec: &mut Recorder,
-        views: &[View],
+        views: impl Into<Views<'a>>,
         look: &Look,
         targets: &Targets,
     ) -> Result<Drawn> {
         self.current()?;
         look.check()?;
-        let size = targets.size;
-        if targets.views.len() != views.len() {
-            let problem = format!("{} of them, for {} views", targets.views.len(), views.len());
-            return Err(Error::refused("targets", problem));
-        }
+        let (views, size) = (views.into(), targets.size);
+        let planned = views.planned();
+        targets.check(planned.len())?;
         let mut presented = self.presented.lock().unwrap_or_else(PoisonError::into_inner);
-        let fits = |picture: &Picture| picture.size() == size && picture.views() == views.len();
+        let fits = |picture: &Picture| picture.size() == size && picture.views() == planned.len();
         let picture = match presented.take().filter(fits) {
             Some(picture) => picture,
-            None => Picture::new(&self.subject.gpu, size, views.len())?,
+            None => Picture::new(&self.subject.gpu, size, planned.len())?,
         };
         let picture = presented.insert(picture);
         let drawn = self.affordable(look, size);
@@ -176,7 +169,7 @@ impl Renderer {
         // A scene's depth may be where theirs goes.
         rec.barrier(&[Access::SampledRead], &[Access::AttachmentWrite]);
         rec.stage(stages::PRESENT)?;
-        self.present.record(rec, picture, drawn.size, views, targets)?;
+        self.present.record(rec, picture, drawn.size, planned, targets)?;
         rec.end_stage()?;
         Ok(drawn)
     }

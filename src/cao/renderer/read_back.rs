@@ -3,6 +3,7 @@
 use super::Renderer;
 use super::drawing::Shot;
 use crate::draw::band::{Band, Bands, PIXEL, afford};
+use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::drive::{Slice, add};
 use crate::{Error, Result};
@@ -147,7 +148,12 @@ impl<'a> Drawing<'a> {
             let tiles = self.slice.of_these(band.tiles() - done);
             let mut rec = self.renderer.subject.gpu.recorder("draw")?;
             let range = done..done + tiles;
-            let shot = Shot { views: self.views, look: self.look, picture: &self.picture, targets: None };
+            let shot = Shot {
+                views: Views::Now(self.views),
+                look: self.look,
+                picture: &self.picture,
+                targets: None,
+            };
             self.renderer.record_tiles(&mut rec, &shot, band, range)?;
             done += tiles;
             if done == band.tiles() {

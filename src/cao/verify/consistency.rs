@@ -4,6 +4,7 @@
 //! image) and the ambient factor that the ray cast reads there. Cost: one ray a point and eye.
 
 use crate::draw::eyes::FrameBuffer;
+use crate::draw::eyes::Views;
 use crate::host::device_buffer;
 use crate::renderer::Renderer;
 use cao_gpu::Result;
@@ -80,7 +81,7 @@ pub fn seen_by_both(
     renderer.current()?;
     let (subject, fields) = (renderer.subject(), renderer.ambient().fields());
     let mut rec = subject.gpu.recorder("frame")?;
-    renderer.frame().record(&mut rec, &subject.field, views, look, subject.reference_mm())?;
+    renderer.frame().record(&mut rec, &subject.field, Views::Now(views), look, subject.reference_mm())?;
     rec.submit_and_wait()?;
     let consistency = Consistency::new(&subject.gpu)?;
     Ok(consistency.run(&subject.gpu, renderer.frame(), fields.opacity, fields.ambient, points)?)

@@ -1,5 +1,6 @@
 //! Pictures.
 
+pub mod air;
 pub mod bounds;
 pub mod brick_distance;
 pub mod clip_normal;

@@ -13,6 +13,7 @@
 //! more light than its ends alone say is halved, up to four times; stretches of segments are lit together, up to four steps and a voxel long or until they stop an eighth of the light.
 
 use crate::clip::clips::{ClipField, visible};
+use crate::draw::air::{air_of, ambient_at};
 use crate::draw::segment::{segment, varies};
 use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
@@ -64,7 +65,7 @@ pub struct Image {
 /// Draws `size` = [width, height] pixels: the mean of the look's samples, each the picture of a field of view that is shifted by its
 /// place in the pixel, and the depth of the first.
 pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
-    let ambient = |position| trilinear_clamped(&frame.grid, frame.ambient, position);
+    let ambient = |position| ambient_at(&frame.grid, frame.ambient, position);
     let views: Vec<View> = frame.look.offsets().into_iter().map(|at| shifted(view, size, at)).collect();
     let mean = |i| {
         let samples = views.iter().map(|view| pixel(frame, view, size, i, &mut { ambient }));
@@ -85,8 +86,8 @@ pub fn shifted(view: &View, size: [usize; 2], place: Vec2) -> View {
     View { tan, ..*view }
 }
 
-/// Index coordinates at which these pixels read the ambient factor, in the order of their rays; where a ray ends depends on what it has
-/// read, and these go as far as the darkest does. One sample a pixel.
+/// Index coordinates of the air whose ambient factor these pixels show, in the order of their rays; where a ray ends depends on what it
+/// has read, and these go as far as the darkest does. One sample a pixel.
 pub fn ambient_positions(
     frame: &Frame,
     view: &View,
@@ -96,7 +97,7 @@ pub fn ambient_positions(
     each(pixels.len(), |i| {
         let mut positions = Vec::new();
         pixel(frame, view, size, pixels[i], &mut |position| {
-            positions.push(position);
+            positions.push(air_of(&frame.grid, frame.ambient, position));
             0.0
         });
         positions

@@ -5,8 +5,7 @@
 //! ```
 //!
 //! A is the ambient factor times the gain, at most 1; A' the same, or 1. n is the direction of the gradient of the values, just behind a
-//! cut the normal of what cut. How much of a surface there is, and which side is out, is what opacity does a voxel along n and back. The
-//! ambient factor is that of half a voxel out.
+//! cut the normal of what cut. How much of a surface there is, and which side is out, is what opacity does a voxel along n and back.
 
 use crate::draw::clip_normal::clip_normal;
 use crate::draw::raycast::Frame;
@@ -32,7 +31,7 @@ pub struct Shown {
 }
 
 /// Linear red, green and blue that it sends back along a ray of this direction to an eye of a head for which light comes from `light`;
-/// its ambient factor from `ambient` of index coordinates.
+/// its ambient factor from `ambient` of index coordinates ([`crate::draw::air`]).
 pub fn shaded(
     frame: &Frame,
     at: &Shown,
