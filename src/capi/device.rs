@@ -45,7 +45,7 @@ pub struct CaoDeviceInfo {
     pub size: u32,
     /// Family of the queue that will run the recordings; it does graphics and compute.
     pub queue_family: u32,
-    /// Of Vulkan 1.3 or newer.
+    /// Of Vulkan 1.3 or newer; of 1.1 or 1.2 with VK_KHR_synchronization2 and VK_KHR_dynamic_rendering, and what they need, on the device.
     pub instance: VkInstance,
     /// The one that the device was made of.
     pub physical_device: VkPhysicalDevice,
@@ -84,43 +84,50 @@ pub unsafe extern "C" fn cao_required_extensions(
 }
 
 /// Sets what this library needs to VK_TRUE in the features that a host is about to make its device with, and leaves the rest. The chain
-/// must hold a VkPhysicalDeviceVulkan13Features. Whether the physical device has them is the host's to ask, or cao_device_adopt's.
+/// must hold a VkPhysicalDeviceVulkan13Features, or the structs of synchronization2 and dynamicRendering. Whether the physical device has them is the host's to ask, or cao_device_adopt's.
 // SAFETY: the name is ours alone; pointers are as the header asks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cao_require_features(features: *mut VkPhysicalDeviceFeatures2) -> CaoResult {
     guard(|| {
         placed("VkPhysicalDeviceFeatures2", features)?;
-        // SAFETY: the header asks for Vulkan's struct, each of whose chain begins with a type and the next.
-        let (core, v13) = unsafe {
-            if (*features).s_type != vk::StructureType::PHYSICAL_DEVICE_FEATURES_2 {
-                let what = "VkPhysicalDeviceFeatures2.sType: is of another struct";
-                return refuse(CaoResult::BadValue, what);
+        // SAFETY: the header asks for Vulkan's struct, which begins with a type.
+        if unsafe { (*features).s_type } != vk::StructureType::PHYSICAL_DEVICE_FEATURES_2 {
+            return refuse(CaoResult::BadValue, "VkPhysicalDeviceFeatures2.sType: is of another struct");
+        }
+        let find = |kind: vk::StructureType| {
+            // SAFETY: the header asks for a chain, each of which begins with a type and the next.
+            unsafe {
+                let mut next = (*features).p_next.cast::<vk::BaseOutStructure<'static>>();
+                while !next.is_null() && (*next).s_type != kind {
+                    next = (*next).p_next;
+                }
+                next
             }
-            let mut next = (*features).p_next.cast::<vk::BaseOutStructure<'static>>();
-            while !next.is_null() && (*next).s_type != vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES
-            {
-                next = (*next).p_next;
-            }
-            (&raw mut (*features).features, next.cast::<vk::PhysicalDeviceVulkan13Features<'static>>())
         };
-        if v13.is_null() {
-            let what =
-                "VkPhysicalDeviceFeatures2.pNext: holds no VkPhysicalDeviceVulkan13Features; chain one";
+        let v13 = find(vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES)
+            .cast::<vk::PhysicalDeviceVulkan13Features<'static>>();
+        let synchronization = find(vk::StructureType::PHYSICAL_DEVICE_SYNCHRONIZATION_2_FEATURES)
+            .cast::<vk::PhysicalDeviceSynchronization2Features<'static>>();
+        let rendering = find(vk::StructureType::PHYSICAL_DEVICE_DYNAMIC_RENDERING_FEATURES)
+            .cast::<vk::PhysicalDeviceDynamicRenderingFeatures<'static>>();
+        if v13.is_null() && (synchronization.is_null() || rendering.is_null()) {
+            let what = "VkPhysicalDeviceFeatures2.pNext: holds no VkPhysicalDeviceVulkan13Features; chain one, or \
+                        VkPhysicalDeviceSynchronization2Features and VkPhysicalDeviceDynamicRenderingFeatures";
             return refuse(CaoResult::BadValue, what);
         }
         let mut required = Gpu::required_features();
-        let chain = required.chain();
-        let needed = chain.p_next.cast::<vk::PhysicalDeviceVulkan13Features<'static>>();
-        // SAFETY: the chain of what is required is these two structs (`what_is_required_is_in_two_structs`), which are Vulkan's: from the
-        // first feature to the last there are numbers of 32 bits and nothing else.
+        let needed = required.chain().features;
+        // SAFETY: structs of the types that they say they are. Those of 1.0 are numbers of 32 bits and nothing else. What is required of
+        // 1.3 is these two (`what_is_required_is_in_two_structs`), which may not stand in both places.
         unsafe {
-            raise(
-                (&raw const chain.features).cast(),
-                core.cast(),
-                size_of::<vk::PhysicalDeviceFeatures>() / 4,
-            );
-            let first = |of: *const vk::PhysicalDeviceVulkan13Features<'static>| of.byte_add(FIRST_OF_13);
-            raise(first(needed).cast(), first(v13).cast_mut().cast(), COUNT_OF_13);
+            raise((&raw const needed).cast(), (&raw mut (*features).features).cast());
+            if v13.is_null() {
+                (*synchronization).synchronization2 = vk::TRUE;
+                (*rendering).dynamic_rendering = vk::TRUE;
+            } else {
+                (*v13).synchronization2 = vk::TRUE;
+                (*v13).dynamic_rendering = vk::TRUE;
+            }
         }
         Ok(())
     })
@@ -129,9 +136,9 @@ pub unsafe extern "C" fn cao_require_features(features: *mut VkPhysicalDeviceFea
 /// Sets every feature that is needed.
 ///
 /// # Safety
-/// Both point to so many.
-unsafe fn raise(needed: *const vk::Bool32, host: *mut vk::Bool32, count: usize) {
-    for i in 0..count {
+/// Both point to the features of Vulkan 1.0.
+unsafe fn raise(needed: *const vk::Bool32, host: *mut vk::Bool32) {
+    for i in 0..size_of::<vk::PhysicalDeviceFeatures>() / size_of::<vk::Bool32>() {
         // SAFETY: the caller's promise.
         unsafe {
             if *needed.add(i) == vk::TRUE {
@@ -141,25 +148,12 @@ unsafe fn raise(needed: *const vk::Bool32, host: *mut vk::Bool32, count: usize) 
     }
 }
 
-/// Where the features of Vulkan 1.3 begin, and how many there are up to `maintenance4`.
-const FIRST_OF_13: usize =
-    std::mem::offset_of!(vk::PhysicalDeviceVulkan13Features<'static>, robust_image_access);
-const COUNT_OF_13: usize =
-    (std::mem::offset_of!(vk::PhysicalDeviceVulkan13Features<'static>, maintenance4) - FIRST_OF_13) / 4 + 1;
-
 /// Functions without which loading or adopting cannot be asked about; where one is missing, what was lent does not belong together.
 const OF_INSTANCE: [&CStr; 4] = [
     c"vkGetDeviceProcAddr",
     c"vkGetPhysicalDeviceFeatures2",
     c"vkGetPhysicalDeviceProperties2",
     c"vkGetPhysicalDeviceQueueFamilyProperties",
-];
-
-/// Of 1.3, and of the extension.
-const OF_DEVICE: [(&CStr, &str); 3] = [
-    (c"vkCmdPipelineBarrier2", "Vulkan 1.3"),
-    (c"vkCmdBeginRendering", "Vulkan 1.3"),
-    (c"vkCmdPushDescriptorSetKHR", "VK_KHR_push_descriptor"),
 ];
 
 /// Lends a device. Nothing of the host's is ever destroyed. Free it with cao_device_free when all that is on it is freed, and before the
@@ -206,13 +200,8 @@ unsafe fn adopt(info: &CaoDeviceInfo) -> Result<Gpu> {
         let entry = ash::Entry::from_static_fn(ash::StaticFn { get_instance_proc_addr });
         let instance = ash::Instance::load(entry.static_fn(), instance);
         let device = vk::Device::from_raw(raw(info.device));
-        for (name, of) in OF_DEVICE {
-            if instance.get_device_proc_addr(device, name.as_ptr()).is_none() {
-                let what = format!("CaoDeviceInfo.device: has no {name:?}; make it with {of} enabled");
-                return refuse(CaoResult::Device, what);
-            }
-        }
-        (entry, instance.clone(), ash::Device::load(instance.fp_v1_0(), device))
+        let device = ash::Device::load(instance.fp_v1_0(), device);
+        (entry, instance, device)
     };
     // SAFETY: the physical device is of this instance.
     let families = unsafe { instance.get_physical_device_queue_family_properties(physical_device) };
@@ -226,10 +215,10 @@ unsafe fn adopt(info: &CaoDeviceInfo) -> Result<Gpu> {
     }
     let queue = (!info.queue.is_null()).then(|| vk::Queue::from_raw(raw(info.queue)));
     let queue_family = info.queue_family;
+    let adopted =
+        Adopted { entry, instance, physical_device, device, queue_family, compute_only: false, queue };
     // SAFETY: the caller's promise.
-    let gpu =
-        unsafe { Gpu::adopt(Adopted { entry, instance, physical_device, device, queue_family, queue }) };
-    Ok(gpu?)
+    Ok(unsafe { Gpu::adopt(adopted) }?)
 }
 
 /// Gives a device back: from here on nothing of the host's is used. Refused while anything is on it.

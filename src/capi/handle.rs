@@ -115,6 +115,10 @@ pub(crate) fn free<H: Handle>(handle: H) -> Result {
         return refuse(CaoResult::InUse, what);
     }
     let taken = table.live.remove(&handle.id());
+    if table.live.is_empty() {
+        // A host that has freed everything leaves nothing, not even room for more.
+        table.live = HashMap::new();
+    }
     drop(table);
     drop((object, taken));
     Ok(())

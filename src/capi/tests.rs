@@ -89,7 +89,7 @@ fn what_somebody_holds_is_not_freed_and_what_is_freed_stays_so() {
     for kind in 0..=u8::MAX {
         let id = u64::from(kind) << 56;
         assert_eq!(code(free(CaoVolume { id })), CaoResult::BadHandle, "{id:#x}");
-        assert_eq!(code(free(CaoVolume { id: id | (1 << 56) - 1 })), CaoResult::BadHandle);
+        assert_eq!(code(free(CaoVolume { id: id | ((1 << 56) - 1) })), CaoResult::BadHandle);
     }
     assert_eq!(code(free(next)), CaoResult::Ok);
 }
@@ -155,6 +155,10 @@ fn what_is_required_is_in_two_structs() {
     let (kind, end) = unsafe { ((*next).s_type, (*next).p_next) };
     assert_eq!(kind, vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
     assert!(end.is_null());
+    // SAFETY: the type says so.
+    let needed = unsafe { *next.cast::<vk::PhysicalDeviceVulkan13Features>() };
+    let these = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
+    assert_eq!(format!("{needed:?}"), format!("{these:?}"), "what cao_require_features sets");
 
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true);
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v13);
@@ -165,8 +169,16 @@ fn what_is_required_is_in_two_structs() {
     assert_eq!(set, CaoResult::Ok);
     assert_eq!((core.geometry_shader, core.shader_storage_image_extended_formats), (vk::TRUE, vk::TRUE));
     assert_eq!((core.robust_buffer_access, core.inherited_queries), (vk::FALSE, vk::FALSE));
-    assert_eq!((v13.synchronization2, v13.dynamic_rendering), (vk::TRUE, vk::TRUE));
-    assert_eq!((v13.maintenance4, v13.robust_image_access), (vk::TRUE, vk::FALSE));
+    let both = these.maintenance4(true);
+    assert_eq!(format!("{v13:?}"), format!("{both:?}"));
+
+    let mut synchronization = vk::PhysicalDeviceSynchronization2Features::default();
+    let mut rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default();
+    let mut features =
+        vk::PhysicalDeviceFeatures2::default().push_next(&mut synchronization).push_next(&mut rendering);
+    // SAFETY: as above.
+    assert_eq!(unsafe { cao_require_features((&raw mut features).cast()) }, CaoResult::Ok);
+    assert_eq!((synchronization.synchronization2, rendering.dynamic_rendering), (vk::TRUE, vk::TRUE));
 }
 
 #[test]
@@ -199,7 +211,9 @@ fn declared() -> Vec<String> {
         if let Some((_, rest)) = line.split_once("extern \"C\" fn cao_") {
             found.push(format!("cao_{}(", name(rest)));
         } else if let Some(rest) = line.strip_prefix("    pub ").filter(|rest| name(rest).len() > 1) {
-            if rest[name(rest).len()..].starts_with(':') && !["Arc<", "Vec<", "CaoResult,"].iter().any(|of| rest.contains(of)) {
+            if rest[name(rest).len()..].starts_with(':')
+                && !["Arc<", "Vec<", "CaoResult,"].iter().any(|of| rest.contains(of))
+            {
                 found.push(name(rest));
             }
         } else if let Some(rest) = line.strip_prefix("pub struct Cao").or(line.strip_prefix("pub enum Cao")) {

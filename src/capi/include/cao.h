@@ -246,7 +246,7 @@ typedef struct {
     uint32_t size;
     // Family of the queue that will run the recordings; it does graphics and compute.
     uint32_t queue_family;
-    // Of Vulkan 1.3 or newer.
+    // Of Vulkan 1.3 or newer; of 1.1 or 1.2 with VK_KHR_synchronization2 and VK_KHR_dynamic_rendering, and what they need, on the device.
     VkInstance instance;
     // The one that the device was made of.
     VkPhysicalDevice physical_device;
@@ -529,7 +529,7 @@ const char *cao_version(void);
 CaoResult cao_required_extensions(const char *const **names, uint32_t *count);
 
 // Sets what this library needs to VK_TRUE in the features that a host is about to make its device with, and leaves the rest. The chain
-// must hold a VkPhysicalDeviceVulkan13Features. Whether the physical device has them is the host's to ask, or cao_device_adopt's.
+// must hold a VkPhysicalDeviceVulkan13Features, or the structs of synchronization2 and dynamicRendering. Whether the physical device has them is the host's to ask, or cao_device_adopt's.
 CaoResult cao_require_features(VkPhysicalDeviceFeatures2 *features);
 
 // Lends a device. Nothing of the host's is ever destroyed. Free it with cao_device_free when all that is on it is freed, and before the
