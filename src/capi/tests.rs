@@ -150,15 +150,22 @@ fn a_renderer_is_of_one_thread_at_a_time_and_outlives_a_panic() {
 fn what_is_required_is_in_two_structs() {
     let mut required = Gpu::required_features();
     let chain = required.chain();
-    let next = chain.p_next.cast::<vk::BaseOutStructure>();
-    // SAFETY: Vulkan's chain.
-    let (kind, end) = unsafe { ((*next).s_type, (*next).p_next) };
-    assert_eq!(kind, vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_FEATURES);
-    assert!(end.is_null());
-    // SAFETY: the type says so.
-    let needed = unsafe { *next.cast::<vk::PhysicalDeviceVulkan13Features>() };
-    let these = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
-    assert_eq!(format!("{needed:?}"), format!("{these:?}"), "what cao_require_features sets");
+    let mut next = chain.p_next.cast::<vk::BaseOutStructure>().cast_const();
+    let mut kinds = Vec::new();
+    while !next.is_null() {
+        // SAFETY: Vulkan's chain; each of these two is a type, the next and one feature.
+        let (kind, feature) = unsafe { ((*next).s_type, next.add(1).cast::<vk::Bool32>().read()) };
+        kinds.push((kind, feature));
+        // SAFETY: as above.
+        next = unsafe { (*next).p_next };
+    }
+    kinds.sort_unstable();
+    let mut these = [
+        (vk::StructureType::PHYSICAL_DEVICE_SYNCHRONIZATION_2_FEATURES, vk::TRUE),
+        (vk::StructureType::PHYSICAL_DEVICE_DYNAMIC_RENDERING_FEATURES, vk::TRUE),
+    ];
+    these.sort_unstable();
+    assert_eq!(kinds, these, "what cao_require_features sets");
 
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default().maintenance4(true);
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut v13);
@@ -169,7 +176,10 @@ fn what_is_required_is_in_two_structs() {
     assert_eq!(set, CaoResult::Ok);
     assert_eq!((core.geometry_shader, core.shader_storage_image_extended_formats), (vk::TRUE, vk::TRUE));
     assert_eq!((core.robust_buffer_access, core.inherited_queries), (vk::FALSE, vk::FALSE));
-    let both = these.maintenance4(true);
+    let both = vk::PhysicalDeviceVulkan13Features::default()
+        .maintenance4(true)
+        .synchronization2(true)
+        .dynamic_rendering(true);
     assert_eq!(format!("{v13:?}"), format!("{both:?}"));
 
     let mut synchronization = vk::PhysicalDeviceSynchronization2Features::default();
