@@ -9,7 +9,7 @@
 //!   another kind is refused, and the table is the only state beside the error callback. An object is freed once nobody is in a call with it.
 //! * **Structs** begin with their size, by which a later version tells what an earlier one was compiled with.
 //! * **Enums** come in as numbers and are checked: a number that is none of them is refused, not undefined.
-//! * **Panics** end at [`error::guard`].
+//! * **Panics** end in `error::guard`, which every function runs in.
 //!
 //! Unsafe is what C cannot promise by types: that a pointer points to what the header says, and that Vulkan's handles are what they seem.
 
