@@ -236,21 +236,32 @@ apt_knows() { # suite
     'Created-By: Packages' "Codename: $1" 'Origin: Debian Backports')" ]
 }
 
-# Adds the backports suite beside the distribution's own source, copying whatever that source says (address, key,
-# components, options), so that a mirror stays a mirror. Prints the file it made; leaves none behind on failure.
+# Prints the distribution's own source with another suite in the place of its own, copying whatever it says besides (address, key,
+# components, options), so that a mirror stays a mirror.
 # shellcheck disable=SC2016 # the $(…) are apt's
-add_backports() { # suite
-  local entry file number made text
+source_for_suite() { # suite
+  local codename entry
+  codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-}")
   entry=$(apt-get indextargets --format '$(SOURCESENTRY)' \
-    'Created-By: Packages' "Codename: ${1%-backports}" 'Origin: Debian' 'Component: main' | head -n 1)
+    'Created-By: Packages' "Codename: $codename" 'Origin: Debian' 'Component: main' | head -n 1)
   # The number counts stanzas in a deb822 file, lines in a classic one.
-  file=${entry%:*} number=${entry##*:}
+  local file=${entry%:*} number=${entry##*:}
   [ -r "$file" ] || return 1
-  made=/etc/apt/sources.list.d/cao-backports.${file##*.}
   case $file in
-  *.sources) text=$(stanza_for_suite "$file" "$number" "$1") ;;
-  *) text=$(sed -n "${number}p" "$file" | sed -E "s/^(deb +(\[[^]]*\] +)?[^ ]+ +)[^ ]+/\1$1/") ;;
+  *.sources) stanza_for_suite "$file" "$number" "$1" ;;
+  *) sed -n "${number}p" "$file" | sed -E "s/^(deb +(\[[^]]*\] +)?[^ ]+ +)[^ ]+/\1$1/" ;;
   esac
+}
+# What the name of a file with this source ends in.
+source_extension() { # source
+  case $1 in deb\ *) echo list ;; *) echo sources ;; esac
+}
+
+# Adds the backports suite beside the distribution's own source. Prints the file it made; leaves none behind on failure.
+add_backports() { # suite
+  local made text
+  text=$(source_for_suite "$1") || return 1
+  made=/etc/apt/sources.list.d/cao-backports.$(source_extension "$text")
   say "adding $1 as $made"
   as_root tee "$made" <<<"$text" >/dev/null || return 1
   # Only the new file is read: fast, and no other source can make this fail. A suite that does not exist is no news.

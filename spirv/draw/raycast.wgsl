@@ -267,7 +267,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     shown.y = min(shown.y, end);
     var n = PARTS * u32(shown.x);
     var size = PARTS;
-    // Up to here the ray is known to be in the bricks that it looked at last.
+    // Before this one samples are known to be in what the ray looked at last.
     var n_out = 0u;
     // Value at n. After a leap, and at first, it is not known.
     var here = 0.0;
@@ -276,6 +276,9 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     var cut = NO_CLIP;
     var t_cut = 0.0;
     var over = false;
+    // Whether clips show the place at asked_n.
+    var asked_n = ~0u;
+    var shown_from = false;
     // Of the stretch that is not lit yet: where it begins, what passes, the colours that it stops, and depth and value, each times the
     // share that is stopped there.
     var first = 0u;
@@ -285,7 +288,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     loop {
         // A stretch at a time, so that neighbouring rays are lit together whatever they have passed.
         loop {
-            let t = ray.begin + f32(n) * part;
+            var t = ray.begin + f32(n) * part;
             over = !(t < shown.y);
             let covered = (1.0 - alpha) * (1.0 - open);
             let full = n % PARTS == 0u && (covered > MOST_LIT || n - first >= stretch);
@@ -300,22 +303,17 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                 let leap = i32(distance_in(distances.word[brick_index(vec3<u32>(brick), bricks)]));
                 // To the last sample before the bricks that are not nearer than `leap`, or out of this one.
                 let way = max(leap, 1);
-                let low = vec3<f32>(brick - way + 1) * f32(BRICK);
-                let high = vec3<f32>(brick + way) * f32(BRICK);
-                let out_low = select((low - start) / along, vec3(1e30), brick < vec3(way));
-                let out_high = select((high - start) / along, vec3(1e30), brick + way >= vec3<i32>(bricks));
+                let faces = vec3<f32>(select(brick - way + 1, brick + way, along > vec3(0.0)) * i32(BRICK));
                 // A ray along an axis never leaves through the faces beside it; in their plane the quotient would be 0/0.
-                let out = select(select(out_low, out_high, along > vec3(0.0)), vec3(1e30), along == vec3(0.0));
+                let out = select((faces - start) / along, vec3(1e30), along == vec3(0.0));
                 let t_out = min(out.x, min(out.y, out.z));
                 let last = PARTS * u32(clamp(floor((t_out - ray.begin) / ray.step - LEAP_MARGIN), 0.0, 1e8));
-                if leap > 0 {
-                    if last > n {
-                        n = last;
-                        known = false;
-                        continue;
-                    }
-                } else {
-                    n_out = last;
+                // A leap ends where the next brick is looked at; in a brick that shows something, behind it.
+                n_out = last + 1u;
+                if leap > 0 && last > n {
+                    n = last;
+                    t = ray.begin + f32(n) * part;
+                    known = false;
                 }
             }
             let t_next = select(t, min(ray.begin + f32(n + size) * part, shown.y), known);
@@ -327,9 +325,13 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                 var near = here;
                 var far = next;
                 var shows = true;
+                var shown_to = true;
                 if clips.count > 0u {
-                    let shown_from = visible_to(asked_at(start + t * along, bricks), eye.origin.xyz + t * ray.direction);
-                    let shown_to = visible_to(asked_at(start + t_next * along, bricks), eye.origin.xyz + t_next * ray.direction);
+                    // A place is asked once, though two segments meet there.
+                    if asked_n != n {
+                        shown_from = visible_to(asked_at(start + t * along, bricks), eye.origin.xyz + t * ray.direction);
+                    }
+                    shown_to = visible_to(asked_at(start + t_next * along, bricks), eye.origin.xyz + t_next * ray.direction);
                     shows = shown_from || shown_to;
                     if shown_from != shown_to {
                         // Only the part on one side of the cut shows.
@@ -354,6 +356,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                     let found = segment(from_sample, to_sample, length);
                     if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
                         size /= 2u;
+                        asked_n = n;
                         continue;
                     }
                     if open == 1.0 {
@@ -363,6 +366,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                     centre += open * found.alpha * vec2(mix(t_from, t_to, found.centre), mix(near, far, found.centre));
                     open *= 1.0 - found.alpha;
                 }
+                shown_from = shown_to;
+                asked_n = n + size;
             }
             here = next;
             if known {

@@ -6,6 +6,7 @@ use crate::field::bricks::BrickList;
 use crate::subject::Subject;
 use cao_gpu::{Buffer, Image, Timings};
 use cao_kernels::shared::categories::{AFFECTED, CLIPPED, UNTOUCHED};
+use cao_model::settings::Setup;
 
 /// Keeps V_AO equal to what the subject's settings define. Owns its volumes and pipelines.
 pub trait Ambient: Send + Sync {
@@ -18,8 +19,27 @@ pub trait Ambient: Send + Sync {
         Ok(())
     }
 
+    /// Whether it has such settings, which may come later.
+    ///
+    /// # Errors
+    /// As [`Self::set`].
+    fn accepts(&self, on: &Subject, setup: &Setup) -> Result<()> {
+        let _ = (on, setup);
+        Ok(())
+    }
+
     /// What there is to do after these changes, in order. Where opacities changed, the subject's occupancy comes before it.
-    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>>;
+    ///
+    /// The last part computes V_AO over a list, of V_AO itself, or of what is [written](Self::written) of it the values `into` an image like
+    /// it. Everything that reads values, transfer function or clips comes before the first part over a list: from there on an update may
+    /// span frames, in which these change.
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed, into: Option<&'a Image>) -> Vec<Part<'a>>;
+
+    /// The clips as they are, for pictures: they are recorded, and what they do to each brick. Touches nothing that an update needs.
+    fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a>;
+
+    /// What the last part of such an update writes.
+    fn written(&self, changed: Changed) -> Written<'_>;
 
     /// Its volumes.
     fn fields(&self) -> Fields<'_>;
@@ -61,6 +81,24 @@ impl Changed {
     pub const ALL: Self = Self { opacities: true, anew: true, clips: true };
     /// Everything is up to date.
     pub const NOTHING: Self = Self { opacities: false, anew: false, clips: false };
+
+    /// These changes and others.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            opacities: self.opacities || other.opacities,
+            anew: self.anew || other.anew,
+            clips: self.clips || other.clips,
+        }
+    }
+}
+
+/// Bricks of V_AO that an update writes.
+#[derive(Clone, Copy)]
+pub struct Written<'a> {
+    /// The bricks that it computes.
+    pub list: &'a BrickList,
+    /// Whether all others hold 1 afterwards, and not what they held.
+    pub all: bool,
 }
 
 /// What a picture is drawn from.

@@ -1,12 +1,13 @@
 //! The two ways to walk the parts of an update: into a host's command buffer, or on the device's own queue with progress.
 
 use crate::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Stage, Timing, Timings};
+use crate::host::row_of_groups;
+use cao_gpu::{Access, Bindings, Buffer, BufferUse, Gpu, Pipeline, Recorder, Stage, Timing, Timings};
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// What earlier frames may still be doing when an update begins, and what the update may do.
-const ANYTHING: [Access; 8] = [
+pub(crate) const ANYTHING: [Access; 8] = [
     Access::TransferRead,
     Access::TransferWrite,
     Access::StorageRead,
@@ -24,8 +25,52 @@ pub struct Part<'a> {
     record: Box<Record<'a>>,
 }
 
-/// Records a part: some of its items, or all of it.
-type Record<'a> = dyn Fn(&mut Recorder, Option<Range<u32>>) -> Result<()> + 'a;
+impl Take<'_> {
+    /// The first item.
+    pub fn first(&self) -> u32 {
+        match self {
+            Self::All => 0,
+            Self::These(items) => items.start,
+            Self::Slice { first, .. } => *first,
+        }
+    }
+
+    /// Runs a kernel of which each group takes an item from the first on, and none beyond the end of `list`, which begins with the group
+    /// counts of all.
+    pub fn dispatch(
+        &self,
+        rec: &mut Recorder,
+        pipeline: &Pipeline,
+        binds: &impl Bindings,
+        push: &[u8],
+        list: &Buffer,
+    ) -> cao_gpu::Result<()> {
+        match self {
+            Self::All => rec.dispatch_indirect(pipeline, binds, push, list, 0),
+            Self::These(items) => rec.dispatch(pipeline, binds, push, row_of_groups(items.len() as u32)),
+            Self::Slice { groups, .. } => rec.dispatch_indirect(pipeline, binds, push, groups, 0),
+        }
+    }
+}
+
+/// Records a part, or some of its items.
+type Record<'a> = dyn Fn(&mut Recorder, &Take) -> Result<()> + 'a;
+
+/// How much of a part.
+#[derive(Clone)]
+pub enum Take<'a> {
+    /// All of it.
+    All,
+    /// These items.
+    These(Range<u32>),
+    /// As many as the device says when it gets there.
+    Slice {
+        /// From this item on.
+        first: u32,
+        /// Group counts of a dispatch in which each group takes an item: at byte 0.
+        groups: &'a Buffer,
+    },
+}
 
 enum Extent<'a> {
     Short,
@@ -56,12 +101,12 @@ impl<'a> Part<'a> {
     }
 
     /// One over a list of items, whose number is known to the device when everything before it has run: recorded whole, or some items at a
-    /// time, `first` at first.
+    /// time, `first` at first, where it is not known how long one takes.
     pub fn items(
         stage: Stage,
         items: Items<'a>,
         first: u32,
-        record: impl Fn(&mut Recorder, Option<Range<u32>>) -> Result<()> + 'a,
+        record: impl Fn(&mut Recorder, &Take) -> Result<()> + 'a,
     ) -> Self {
         Self { stage, extent: Extent::Items { items, first }, record: Box::new(record) }
     }
@@ -69,6 +114,21 @@ impl<'a> Part<'a> {
     /// What it is.
     pub fn stage(&self) -> Stage {
         self.stage
+    }
+
+    /// Its list, and how many items to take at first; `None` of a part that is always recorded whole.
+    pub fn listed(&self) -> Option<(Items<'a>, u32)> {
+        match self.extent {
+            Extent::Items { items, first } => Some((items, first)),
+            Extent::Short | Extent::Long => None,
+        }
+    }
+
+    /// Records it, or some of its items, as a stage.
+    pub fn record(&self, rec: &mut Recorder, take: &Take) -> Result<()> {
+        rec.stage(self.stage)?;
+        (self.record)(rec, take)?;
+        Ok(rec.end_stage()?)
     }
 
     /// What it takes at most, in ms; unknown where nobody has seen it run.
@@ -130,7 +190,7 @@ pub fn record(rec: &mut Recorder, parts: &[Part]) -> Result<()> {
     for same in parts.chunk_by(|a, b| a.stage == b.stage) {
         rec.stage(same[0].stage)?;
         for part in same {
-            (part.record)(rec, None)?;
+            (part.record)(rec, &Take::All)?;
         }
         rec.end_stage()?;
     }
@@ -158,7 +218,8 @@ pub fn run(gpu: &Gpu, parts: &[Part], pace: &mut Pace, progress: &mut dyn FnMut(
             }
             Extent::Items { items, first } => {
                 let count = read_count(gpu, items)?;
-                let mut record = |rec: &mut Recorder, items: Range<u32>| (part.record)(rec, Some(items));
+                let mut record =
+                    |rec: &mut Recorder, items: Range<u32>| (part.record)(rec, &Take::These(items));
                 let told = &mut |of: f64| progress(share(of));
                 let ms = in_parts(gpu, part.stage, count, first, &mut record, told)?;
                 add(&mut timings, part.stage, ms);

@@ -16,6 +16,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether the device is lost ([`cao_gpu::Error::device_lost`]).
+    pub fn device_lost(&self) -> bool {
+        matches!(self, Self::Gpu(error) if error.device_lost())
+    }
+
     /// The refusal of the setting `what`.
     pub(crate) fn refused(what: &str, problem: impl Into<String>) -> Self {
         cao_model::Error::refused(what, problem).into()

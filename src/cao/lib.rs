@@ -61,6 +61,7 @@
 #![forbid(unsafe_code)]
 
 pub mod ambient;
+pub mod build;
 pub mod cast;
 pub mod clip;
 pub mod draw;
@@ -78,6 +79,7 @@ pub mod verify;
 pub use cao_gpu as gpu;
 pub use cao_model as model;
 
+pub use build::{Budget, Stale, Updated};
 pub use cao_model::clip::{Clip, Mode, Pose, Shape};
 pub use cao_model::fit::Fitting;
 pub use cao_model::frame::{Frame, Turn};

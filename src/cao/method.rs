@@ -12,23 +12,23 @@ use cao_model::methods::Method;
 struct Maker {
     method: Method,
     new: fn(&Subject) -> Result<Box<dyn Ambient>>,
-    /// How far in mm it wants the maps of clip meshes dilated.
-    map_radius: fn(&Subject) -> f32,
+    /// How far in mm it wants the maps of clip meshes dilated, if it wants any.
+    map_radius: fn(&Subject) -> Option<f32>,
 }
 
 const MAKERS: &[Maker] = &[
     Maker {
         method: Method::Lao,
         new: |on| Ok(Box::new(Full::new(on)?)),
-        map_radius: crate::cast::map_radius,
+        map_radius: |on| Some(crate::cast::map_radius(on)),
     },
     Maker {
         method: Method::Cao,
         new: |on| Ok(Box::new(Contextual::new(on)?)),
-        map_radius: crate::cast::map_radius,
+        map_radius: |on| Some(crate::cast::map_radius(on)),
     },
     // Changes are found in the opacities; nothing is dilated.
-    Maker { method: Method::Rays, new: |on| Ok(Box::new(Traced::new(on)?)), map_radius: |_| 0.0 },
+    Maker { method: Method::Rays, new: |on| Ok(Box::new(Traced::new(on)?)), map_radius: |_| None },
 ];
 
 fn maker(on: &Subject) -> &'static Maker {
@@ -40,8 +40,8 @@ pub(crate) fn of(on: &Subject) -> Result<Box<dyn Ambient>> {
     (maker(on).new)(on)
 }
 
-/// How far in mm this method wants the maps of clip meshes dilated.
-pub(crate) fn map_radius(on: &Subject) -> f32 {
+/// How far in mm this method wants the maps of clip meshes dilated, if it wants any.
+pub(crate) fn map_radius(on: &Subject) -> Option<f32> {
     (maker(on).map_radius)(on)
 }
 

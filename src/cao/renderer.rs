@@ -17,26 +17,29 @@ use crate::draw::picture::Picture;
 use crate::draw::present::Present;
 use crate::draw::raycast::Raycast;
 use crate::draw::scene_depth::SceneDepth;
-use crate::drive::{self, Pace, Part};
+use crate::drive::Pace;
 use crate::field::Field;
 use crate::field::volume_image;
 use crate::host::read_values;
 use crate::method;
-use crate::stages;
 use crate::subject::Subject;
 use crate::{Error, Result};
-use cao_gpu::{Access, Buffer, Format, Gpu, Image, Phase, Recorder, Timings};
+use cao_gpu::{Access, Buffer, Format, Gpu, Image, Timings};
 use cao_model::clip::Clip;
+use cao_model::methods::Method;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
 use glam::Vec3;
 use std::sync::Mutex;
 
+mod building;
 mod drawing;
 #[cfg(test)]
 mod failures;
 mod read_back;
+
+use building::Building;
 
 pub use crate::draw::band::Bands;
 pub use crate::draw::budget::{Drawn, Quality};
@@ -64,7 +67,11 @@ pub struct Renderer {
     presented: Mutex<Option<Picture>>,
     /// What frames with a budget can afford.
     controller: Mutex<Controller>,
+    /// Edits that no update has taken in.
     changed: Changed,
+    /// Edits that no picture can show.
+    unshown: Changed,
+    building: Building,
     pace: Pace,
     /// Times of preparing clip meshes since the last update.
     prepared: Timings,
@@ -96,6 +103,8 @@ impl Renderer {
             controller: Mutex::new(Controller::default()),
             subject,
             changed: Changed::ALL,
+            unshown: Changed::ALL,
+            building: Building::new(gpu)?,
             pace: Pace::default(),
             prepared: Timings::new(),
         })
@@ -105,41 +114,51 @@ impl Renderer {
     pub fn set_transfer(&mut self, transfer: TransferFunction) -> Result<()> {
         transfer.check()?;
         // A length of its own changes what every ray sees, even where no opacity changes.
-        self.changed.anew |= transfer.reference_mm != self.subject.transfer.reference_mm;
-        self.changed.opacities = true;
+        let anew = transfer.reference_mm != self.subject.transfer.reference_mm;
+        self.edited(Changed { opacities: true, anew, ..Changed::NOTHING });
         self.subject.transfer = transfer;
         Ok(())
     }
 
+    fn edited(&mut self, changed: Changed) {
+        (self.changed, self.unshown) = (self.changed.and(changed), self.unshown.and(changed));
+    }
+
     /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, and when the method is
-    /// another. On error everything stays as it was.
+    /// another: then nothing is occluded until the next update has ended. While an update spans frames other settings of the same method wait
+    /// for its end. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
         setup.check(f64::from(self.subject.field.min_spacing()))?;
-        let before = std::mem::replace(&mut self.subject.setup, setup);
-        match self.prepare_clips().and_then(|()| self.hold(before)) {
-            Ok(changed) => {
-                self.changed = changed;
-                self.pace.clear();
-            }
-            Err(error) => {
-                // Maps of one radius under rays of another would leave voxels stale.
-                self.subject.setup = before;
-                self.restore_clips()?;
-                return Err(error);
-            }
+        let before = (self.subject.setup, self.subject.wanted);
+        let waits = self.is_building() && setup.method == before.0.method;
+        if waits {
+            self.ambient.accepts(&self.subject, &setup)?;
+        } else {
+            self.subject.setup = setup;
         }
+        self.subject.wanted = setup;
+        let held =
+            self.prepare_clips().and_then(|()| if waits { Ok(()) } else { self.hold(before.0.method) });
+        if let Err(error) = held {
+            // Maps of one radius under rays of another would leave voxels stale.
+            (self.subject.setup, self.subject.wanted) = before;
+            self.restore_clips()?;
+            return Err(error);
+        }
+        self.edited(Changed { anew: true, ..Changed::NOTHING });
+        self.pace.clear();
+        self.building.rates.clear();
         Ok(())
     }
 
-    /// Makes what is held fit the setup; returns what is out of date then.
-    fn hold(&mut self, before: Setup) -> Result<Changed> {
-        if before.method == self.subject.setup.method {
-            self.ambient.set(&self.subject)?;
-            Ok(Changed { anew: true, ..self.changed })
-        } else {
-            self.ambient = method::of(&self.subject)?;
-            Ok(Changed::ALL)
+    /// Makes what is held fit the setup; of another method nothing is up to date.
+    fn hold(&mut self, before: Method) -> Result<()> {
+        if before == self.subject.setup.method {
+            return self.ambient.set(&self.subject);
         }
+        self.ambient = method::of(&self.subject)?;
+        self.invalidate();
+        Ok(())
     }
 
     /// Overwrites a box of voxels, the first of which is `first`, by the values of a volume of the same type. Uses the device's
@@ -150,12 +169,14 @@ impl Renderer {
     pub fn set_values(&mut self, first: [u32; 3], values: &Volume) -> Result<()> {
         let written = self.subject.field.overwrite(&self.subject.gpu, first, values);
         // Values that are refused change nothing; where the device fails some may be there.
-        self.changed.opacities |= !matches!(written, Err(Error::Model(_)));
+        if !matches!(written, Err(Error::Model(_))) {
+            self.edited(Changed { opacities: true, ..Changed::NOTHING });
+        }
         written
     }
 
-    /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or has a new scale; moving
-    /// and turning never do. On error the clips stay as they were.
+    /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or its axes have a new ratio, and
+    /// with methods `lao` and `cao` where it has a new scale; moving and turning never do. On error the clips stay as they were.
     pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
         if let Err(error) = self.prepare_clips() {
@@ -163,112 +184,22 @@ impl Renderer {
             self.restore_clips()?;
             return Err(error);
         }
-        self.changed.clips = true;
+        self.edited(Changed { clips: true, ..Changed::NOTHING });
         Ok(())
     }
 
     /// Maps of clip meshes again, after others failed. Where these fail too, nothing counts as done.
     fn restore_clips(&mut self) -> Result<()> {
-        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
-        self.prepare_clips()?;
-        self.changed = changed;
+        if let Err(error) = self.prepare_clips() {
+            self.invalidate();
+            return Err(error);
+        }
         Ok(())
     }
 
     fn prepare_clips(&mut self) -> Result<()> {
         let radius = method::map_radius(&self.subject);
         self.prepared.extend(self.subject.prepare_clips(radius)?);
-        Ok(())
-    }
-
-    /// What changed. From here on nothing counts as done until all of it is: an error or a panic on the way leaves everything to do.
-    fn begin(&mut self) -> Changed {
-        match self.changed {
-            Changed::NOTHING => Changed::NOTHING,
-            _ => std::mem::replace(&mut self.changed, Changed::ALL),
-        }
-    }
-
-    /// What there is to do after these changes, in order.
-    fn parts(&self, changed: Changed) -> Vec<Part<'_>> {
-        if changed == Changed::NOTHING {
-            return Vec::new();
-        }
-        let mut parts = Vec::new();
-        if changed.opacities {
-            parts.push(self.subject.occupancy());
-        }
-        parts.extend(self.ambient.update(&self.subject, changed));
-        parts.push(self.distances());
-        parts
-    }
-
-    /// How far rays may leap, and where they end, after new occupancy or clips.
-    fn distances(&self) -> Part<'_> {
-        Part::short(stages::DISTANCES, |rec| {
-            let (field, occupancy) = (&self.subject.field, &self.subject.occupancy);
-            let clip_bricks = self.ambient.fields().clip_bricks;
-            self.brick_distance.record(rec, field, occupancy, clip_bricks, &self.distances)?;
-            Ok(self.bounds_of.record(rec, field, &self.distances, &self.bounds)?)
-        })
-    }
-
-    /// Records what brings the ambient volume up to date: nothing where nothing changed.
-    ///
-    /// From here on the renderer takes the commands as done. They must be submitted, in the order of recording and before
-    /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
-    /// nothing counts as done, and what was recorded should not be submitted.
-    pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
-        let changed = self.begin();
-        let parts = self.parts(changed);
-        if !parts.is_empty() {
-            drive::record(rec, &parts)?;
-        }
-        drop(parts);
-        // Hosts that only record never ask for these times; they must not pile up.
-        self.prepared.0.clear();
-        self.changed = Changed::NOTHING;
-        Ok(())
-    }
-
-    /// The same on the device's own queue, in parts, telling `progress` the share done. Waits for the end; returns the time of each
-    /// stage, clip meshes prepared since the last update included. After an error, or a panic of `progress`, nothing counts as done, and
-    /// the next update computes everything.
-    pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
-        let changed = self.begin();
-        if !self.subject.clips_are_prepared() {
-            self.prepare_clips()?;
-        }
-        let mut timings = std::mem::take(&mut self.prepared);
-        let mut pace = std::mem::take(&mut self.pace);
-        let ran = drive::run(&self.subject.gpu, &self.parts(changed), &mut pace, progress);
-        self.pace = pace;
-        timings.extend(ran?);
-        self.changed = Changed::NOTHING;
-        Ok(timings)
-    }
-
-    /// Takes nothing on the device for granted, so that the next update recomputes everything: after commands of
-    /// [`Self::record_update`] that were never submitted. Clip meshes stay prepared: that never waits for the host.
-    pub fn invalidate(&mut self) {
-        self.changed = Changed::ALL;
-    }
-
-    /// Refuses to show or read what no longer fits the scene.
-    pub(crate) fn current(&self) -> Result<()> {
-        match self.changed {
-            Changed::NOTHING => Ok(()),
-            _ => Err(Error::refused("ambient volume", "out of date; call update or record_update first")),
-        }
-    }
-
-    /// Brings V_o alone up to date; V_AO goes out of date, so that the next update computes everything. Uses the device's queue and waits
-    /// for it.
-    pub(crate) fn update_opacity(&mut self) -> Result<()> {
-        let changed = std::mem::replace(&mut self.changed, Changed::ALL);
-        let mut parts = self.parts(changed);
-        parts.retain(|part| matches!(part.stage().phase, Phase::Opacity | Phase::Clip));
-        drive::run(&self.subject.gpu, &parts, &mut Pace::default(), &mut |_| ())?;
         Ok(())
     }
 
@@ -290,30 +221,30 @@ impl Renderer {
         self.ambient.categories(&self.subject)
     }
 
-    /// V_AO, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
+    /// V_AO, x fastest, as pictures show it: while an update spans frames, that of the last one. Refuses while out of date. Uses the device's queue and waits for it.
     pub fn read_ambient(&self) -> Result<Vec<f32>> {
         self.current()?;
         Ok(read_values(&self.subject.gpu, self.ambient.fields().ambient)?)
     }
 
-    /// V_o after clipping, x fastest. Refuses while out of date. Uses the device's queue and waits for it.
+    /// V_o after clipping, x fastest. Refuses while out of date, or while an update spans frames. Uses the device's queue and waits for it.
     pub fn read_opacity(&self) -> Result<Vec<f32>> {
-        self.current()?;
+        self.complete()?;
         Ok(read_values(&self.subject.gpu, self.ambient.fields().opacity)?)
     }
 
     /// V_m, x fastest: 0 clipped, 1 affected, 2 untouched; of rays by brick 1 in those that the last update computed and 2
-    /// elsewhere. Refuses while out of date. Uses the device's queue and waits for it.
+    /// elsewhere. Refuses while out of date, or while an update spans frames. Uses the device's queue and waits for it.
     pub fn read_mask(&self) -> Result<Vec<u8>> {
-        self.current()?;
+        self.complete()?;
         self.ambient.mask(&self.subject)
     }
 
     /// How far what is visible, clips and all, reaches along each direction: the largest `d·p` in mm over its points `p`, from the volume's
     /// centre, index axes ([`crate::draw::extent`]); `None` where nothing is visible. It is what [`Fitting`](cao_model::fit::Fitting)
-    /// asks for. Refuses while out of date. Uses the device's queue and waits for it.
+    /// asks for. Refuses while out of date, or while an update spans frames. Uses the device's queue and waits for it.
     pub fn visible_extent(&self, directions: &[Vec3]) -> Result<Option<Vec<f32>>> {
-        self.current()?;
+        self.complete()?;
         let (subject, fields) = (&self.subject, self.ambient.fields());
         let (occupancy, clip_bricks) = (&subject.occupancy, fields.clip_bricks);
         self.extent.run(&subject.gpu, &subject.field, fields.opacity, occupancy, clip_bricks, directions)
@@ -343,8 +274,9 @@ impl Renderer {
         &self.subject.field
     }
 
-    /// How occlusion is computed.
+    /// How occlusion is computed, or will be when an update that spans frames has ended.
+    #[expect(clippy::misnamed_getters, reason = "the one that was set, not the one that a running update has")]
     pub fn setup(&self) -> &Setup {
-        &self.subject.setup
+        &self.subject.wanted
     }
 }

@@ -16,6 +16,8 @@ pub const PRECOMPUTE: Stage = Stage::new("precompute lao", Phase::Prepare);
 pub const OCCUPANCY: Stage = Stage::new("occupancy", Phase::Opacity);
 /// V_o before clipping.
 pub const OPACITY: Stage = Stage::new("opacity", Phase::Opacity);
+/// The clips, and what they do to each brick, for the picture alone.
+pub const CLIPS: Stage = Stage::new("clips", Phase::Clip);
 /// V_o after clipping, and the category of every voxel.
 pub const CLASSIFY: Stage = Stage::new("classify", Phase::Clip);
 /// V_o in place, and what changed.
@@ -30,6 +32,8 @@ pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
 pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
 /// Rays of these bricks.
 pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
+/// What a build made of several frames is shown.
+pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 /// How far rays of the picture may leap.
 pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
 /// Where a host's scene ends the picture's rays.

@@ -1,6 +1,7 @@
 //! A scene on the device: what every method reads and none owns.
 
 use crate::Result;
+use crate::clip::clip_bricks::ClipBricks;
 use crate::clip::clips::ClipSet;
 use crate::clip::dilate::Dilate;
 use crate::clip::peel::Peel;
@@ -28,8 +29,12 @@ pub struct Subject {
     pub transfer_buffer: TransferBuffer,
     /// The clips, as kernels read them.
     pub clip_set: ClipSet,
-    /// How occlusion is computed.
+    /// How V_AO is computed: by the last update that began.
     pub setup: Setup,
+    /// How the next one is to compute it; the same unless an update spans frames.
+    pub(crate) wanted: Setup,
+    /// Reference length in mm of the opacities that V_AO is computed from, as of [`Self::setup`].
+    pub(crate) ambient_mm: f32,
     pub(crate) transfer: TransferFunction,
     pub(crate) clips: Vec<Clip>,
     occupancy_kernel: Occupancy,
@@ -48,7 +53,9 @@ impl Subject {
             occupancy: gpu.buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device)?,
             transfer_buffer: TransferBuffer::new(gpu)?,
             clip_set: ClipSet::new(gpu)?,
+            ambient_mm: transfer.reference_mm(f64::from(field.min_spacing())),
             setup,
+            wanted: setup,
             transfer,
             clips: Vec::new(),
             occupancy_kernel: Occupancy::new(gpu)?,
@@ -69,11 +76,11 @@ impl Subject {
         0.5 * Vec3::new(edge(0), edge(1), edge(2)).length()
     }
 
-    /// Makes the maps of clip meshes that are not there yet, dilated by `radius_mm`. Uses the device's queue only then.
-    pub(crate) fn prepare_clips(&mut self, radius_mm: f32) -> Result<Timings> {
+    /// Makes the maps of clip meshes that are not there yet, dilated by `radius_mm` where it is a number. Uses the device's queue only then.
+    pub(crate) fn prepare_clips(&mut self, radius_mm: Option<f32>) -> Result<Timings> {
         let half_mm = self.half_diagonal();
-        let Self { gpu, peel, dilate, clips, clip_set, setup, .. } = self;
-        clip_set.prepare(gpu, peel, dilate, clips, radius_mm, half_mm, setup.maps)
+        let Self { gpu, peel, dilate, clips, clip_set, wanted, .. } = self;
+        clip_set.prepare(gpu, peel, dilate, clips, radius_mm, half_mm, wanted.maps)
     }
 
     /// Whether every clip mesh has its maps: not after making them failed.
@@ -92,8 +99,17 @@ impl Subject {
         })
     }
 
-    /// Records the clips at their poses.
-    pub(crate) fn record_clips(&self, rec: &mut Recorder) -> Result<()> {
-        self.clip_set.record(rec, &self.clips, self.half_diagonal())
+    /// Records the clips at their poses, and what they do to each brick; `reach` as [`ClipBricks::record`] has it.
+    pub(crate) fn record_clip_bricks(
+        &self,
+        rec: &mut Recorder,
+        kernel: &ClipBricks,
+        reach: f32,
+        clip_bricks: &Buffer,
+    ) -> Result<()> {
+        self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
+        kernel.record(rec, &self.field, &self.clip_set, reach, clip_bricks)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+        Ok(())
     }
 }

@@ -1,6 +1,8 @@
 //! Handles: numbers for what lives here. The upper eight bits are the kind, the others count and never repeat, so that any number, from a host
 //! that is wrong in any way, is either alive, or was, or never was. One look-up in a map a handle and call.
 
+#![forbid(unsafe_code)]
+
 use crate::error::{CaoResult, Result, refuse};
 use std::any::Any;
 use std::collections::HashMap;

@@ -7,7 +7,7 @@ use crate::edge::{answer, read};
 use crate::error::{CaoResult, Failure, Result, guard, refuse};
 use crate::handle::{free, get, handle, insert};
 use crate::image::CaoImage;
-use crate::renderer::CaoRenderer;
+use crate::renderer::{CaoRenderer, Shared};
 use ash::vk::{self, Handle as _};
 use cao::renderer::Targets;
 use cao_gpu::{Image, Recorded, Recorder};
@@ -24,7 +24,11 @@ pub struct CaoRecording {
 handle!(CaoRecording, 6, "recording", Recording);
 
 /// A recording, from its beginning until the device has run it.
-pub(crate) struct Recording(Mutex<Inside>);
+pub(crate) struct Recording {
+    inside: Mutex<Inside>,
+    /// The handle's number.
+    device: u64,
+}
 
 struct Inside {
     state: State,
@@ -68,15 +72,23 @@ impl Drop for Inside {
 }
 
 impl Recording {
+    /// Refuses a renderer of another device.
+    fn check(&self, renderer: &Shared) -> Result {
+        if self.device == renderer.device {
+            return Ok(());
+        }
+        refuse(CaoResult::BadValue, "renderer: is on another device than the recording")
+    }
+
     fn inside(&self) -> Result<MutexGuard<'_, Inside>> {
-        match self.0.try_lock() {
+        match self.inside.try_lock() {
             Ok(inside) => Ok(inside),
             Err(TryLockError::WouldBlock) => {
                 refuse(CaoResult::Busy, "recording: another thread is in a call with it")
             }
             Err(TryLockError::Poisoned(inside)) => {
                 let mut inside = inside.into_inner();
-                self.0.clear_poison();
+                self.inside.clear_poison();
                 inside.give_up();
                 inside.state = State::Failed("a fault of this library".into());
                 Ok(inside)
@@ -118,7 +130,7 @@ pub unsafe extern "C" fn cao_recording_begin(
         let rec = unsafe { gpu.record_into(vk::CommandBuffer::from_raw(commands as u64)) };
         let state = State::Open(Box::new(rec));
         let inside = Inside { state, images: Vec::new(), updated: Vec::new() };
-        Ok(insert(Recording(Mutex::new(inside)), device.id))
+        Ok(insert(Recording { inside: Mutex::new(inside), device: device.id }, device.id))
     };
     // SAFETY: the header asks for it.
     guard(|| unsafe { answer(recording, CaoRecording { id: 0 }, make) })
@@ -155,6 +167,7 @@ pub extern "C" fn cao_recording_release(recording: CaoRecording, image: CaoImage
 pub extern "C" fn cao_recording_update(recording: CaoRecording, renderer: CaoRenderer) -> CaoResult {
     guard(|| {
         let (recording, shared) = (get(recording)?, get(renderer)?);
+        recording.check(&shared)?;
         recording.record(|inside| {
             shared.enter(|renderer| {
                 inside.open()?;
@@ -175,6 +188,7 @@ pub unsafe extern "C" fn cao_recording_draw(
 ) -> CaoResult {
     guard(|| {
         let (recording, shared) = (get(recording)?, get(renderer)?);
+        recording.check(&shared)?;
         // SAFETY: the header asks for it.
         let drawing = unsafe { Drawing::of(&read(draw)?) }?;
         recording.record(|inside| {

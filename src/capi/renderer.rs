@@ -34,6 +34,8 @@ pub(crate) struct Shared {
     pub stale: Arc<AtomicBool>,
     range: (f64, f64),
     spacing: f64,
+    /// The handle's number of the device that it is on.
+    pub device: u64,
 }
 
 impl Shared {
@@ -233,7 +235,8 @@ pub unsafe extern "C" fn cao_renderer_create(
         let colour = format(info.colour_format)?;
         let transfer = TransferFunction::preset(preset, range)?;
         let renderer = Mutex::new(Renderer::new(&gpu, &volume, transfer, setup, colour)?);
-        Ok(insert(Shared { renderer, stale: Arc::default(), range, spacing }, info.device.id))
+        let device = info.device.id;
+        Ok(insert(Shared { renderer, stale: Arc::default(), range, spacing, device }, device))
     };
     // SAFETY: the header asks for it.
     guard(|| unsafe { answer(renderer, CaoRenderer { id: 0 }, make) })

@@ -8,7 +8,7 @@ use super::{
     idle::Idle,
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
-    validation::{LAYER, ValidationLog},
+    validation::ValidationLog,
 };
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
@@ -139,12 +139,12 @@ impl Instance {
         let mut messenger;
         let mut create = vk::InstanceCreateInfo::default().application_info(&application);
         if let Some(log) = validation {
-            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER)) {
+            if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(ValidationLog::LAYER)) {
                 return Err(Error::Device {
                     problem: "validation was asked for, but its layer is missing; install it, on Debian or Ubuntu `apt install vulkan-validationlayers`".into(),
                 });
             }
-            layer_names.push(LAYER.as_ptr());
+            layer_names.push(ValidationLog::LAYER.as_ptr());
             names.push(vk::EXT_VALIDATION_FEATURES_NAME.as_ptr());
             messenger = log.messenger();
             create = create.push_next(&mut features).push_next(&mut messenger);
@@ -346,6 +346,12 @@ impl Gpu {
     /// Name and bytes of every buffer and image that is alive, sorted by name.
     pub fn memory_report(&self) -> Vec<(String, u64)> {
         self.0.memory.report()
+    }
+
+    /// Has all allocations of device memory fail after `count` more, as if the device had no memory left; `None` ends that. For hosts
+    /// that want to know how they bear it.
+    pub fn fail_after(&self, count: Option<u32>) {
+        self.0.memory.fail_after(count);
     }
 
     /// Most bytes that buffers and images held at once.

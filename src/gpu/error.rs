@@ -60,3 +60,10 @@ pub enum Error {
         problem: String,
     },
 }
+
+impl Error {
+    /// Whether the device is lost. Nothing comes back from it: drop all that was made with it, and make it, or have the host make it, anew.
+    pub fn device_lost(&self) -> bool {
+        matches!(self, Error::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. })
+    }
+}

@@ -17,6 +17,8 @@ pub(crate) struct Memory(Mutex<State>);
 struct State {
     allocator: Allocator,
     peak: u64,
+    /// Allocations until one is refused.
+    left: Option<u32>,
 }
 
 impl Memory {
@@ -34,7 +36,7 @@ impl Memory {
         });
         let allocator =
             allocator.map_err(|e| Error::Device { problem: format!("cannot manage device memory: {e}") })?;
-        Ok(Self(Mutex::new(State { allocator, peak: 0 })))
+        Ok(Self(Mutex::new(State { allocator, peak: 0, left: None })))
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -50,6 +52,14 @@ impl Memory {
         linear: bool,
     ) -> Result<Allocation> {
         let mut state = self.lock();
+        if state.left == Some(0) {
+            return Err(Error::Memory {
+                object: name.into(),
+                bytes: requirements.size,
+                problem: "refused, as Gpu::fail_after asked for".into(),
+            });
+        }
+        state.left = state.left.map(|left| left - 1);
         let wanted = AllocationCreateDesc {
             name,
             requirements,
@@ -79,6 +89,11 @@ impl Memory {
         let mut list: Vec<_> = report.allocations.into_iter().map(|a| (a.name, a.size)).collect();
         list.sort();
         list
+    }
+
+    /// Refuses all allocations after so many more; `None` refuses none.
+    pub fn fail_after(&self, count: Option<u32>) {
+        self.lock().left = count;
     }
 
     /// Most bytes ever allocated at once.

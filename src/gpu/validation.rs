@@ -7,9 +7,6 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// The layer.
-pub(crate) const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
-
 /// A message that is known, harmless here and explained.
 struct Mute {
     /// The message's id, as in [`ValidationLog::messages`].
@@ -37,6 +34,9 @@ const MUTED: &[Mute] = &[Mute {
 pub struct ValidationLog(Arc<Mutex<Vec<String>>>);
 
 impl ValidationLog {
+    /// The layer.
+    pub const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
     /// All messages so far, `id: text` each.
     pub fn messages(&self) -> Vec<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
@@ -59,8 +59,9 @@ impl ValidationLog {
         keep(&self.0, id, text);
     }
 
-    /// How Vulkan is told to report into this log. The log must outlive the instance and the messenger made of it.
-    pub(crate) fn messenger(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    /// How Vulkan is told to report into this log; for hosts too, beside the layer and `VK_EXT_debug_utils`. The log must outlive the
+    /// instance and the messenger made of it.
+    pub fn messenger(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
         use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Kind};
         vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(Severity::WARNING | Severity::ERROR)

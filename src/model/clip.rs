@@ -302,6 +302,16 @@ impl ClipCamera {
         }
     }
 
+    /// The camera that sees a mesh so many times as large as this one sees it.
+    pub fn larger(&self, times: f32) -> Self {
+        Self {
+            corner: self.corner * times,
+            pixel_mm: self.pixel_mm * times,
+            depth_mm: self.depth_mm * times,
+            resolution: self.resolution,
+        }
+    }
+
     /// Point of the rigid frame (mm) → (pixel x, pixel y, depth 0 … 1).
     pub fn map(&self, rigid: Vec3) -> Vec3 {
         (rigid - self.corner) / Vec3::new(self.pixel_mm, self.pixel_mm, self.depth_mm)

@@ -46,7 +46,7 @@ impl<'a> Kernels<'a> {
         let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
         let half_mm = 0.5 * size_mm(grid).length();
         let mut set = ClipSet::new(gpu).unwrap();
-        set.prepare(gpu, &self.peel, &self.dilate, clips, radius, half_mm, maps).unwrap();
+        set.prepare(gpu, &self.peel, &self.dilate, clips, Some(radius), half_mm, maps).unwrap();
         run(gpu, |rec| set.record(rec, clips, half_mm).unwrap());
         Clipped { field, set, reach }
     }

@@ -69,25 +69,8 @@ impl<'a> Bench<'a> {
             Ok(k.bricks.record(rec, field, which, opacity, mask, &v.changed_before, &v.list)?)
         });
         // So few at first that there are several parts.
-        let rays = Part::items(LAO, v.list.items(field), 5, move |rec, items| {
-            match items {
-                None => k.lao.record(rec, field, occlusion, *reference_mm, *scope, Work::Full, b)?,
-                Some(items) => {
-                    let (base, count) = (items.start, items.len() as u32);
-                    k.lao.record_part(
-                        rec,
-                        field,
-                        occlusion,
-                        *reference_mm,
-                        *scope,
-                        Work::Full,
-                        b,
-                        base,
-                        count,
-                    )?;
-                }
-            }
-            Ok(())
+        let rays = Part::items(LAO, v.list.items(field), 5, move |rec, take| {
+            Ok(k.lao.record(rec, field, occlusion, *reference_mm, *scope, Work::Full, b, take)?)
         });
         [listed, rays]
     }

@@ -1,7 +1,6 @@
 //! The kernel `present`: attachments of every colour format hold what the picture holds, rounded to that format.
 
 use cao::draw::picture::Picture;
-use cao::draw::present::Present;
 use cao::renderer::{COLOUR, Drawn, Place, Quality, Renderer, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
 use cao_model::builtin::builtin_box;
@@ -193,8 +192,6 @@ fn what_does_not_fit_is_refused_by_name() {
     for (views, size) in [(0, SIZE), (View::MAX + 1, SIZE), (2, [0, 8]), (2, [1 << 20, 8])] {
         assert!(Picture::new(&gpu, size, views).is_err(), "{views} views of {size:?}");
     }
-    let picture = Picture::new(&gpu, SIZE, 2).unwrap();
-    let present = Present::new(&gpu, Format::Rgba8Unorm).unwrap();
     let [colour, depth] = attachments(&gpu, COLOUR, 2);
     let [one, _] = attachments(&gpu, COLOUR, 1);
     let two = Target::layers(&colour, &depth, 2);
@@ -220,6 +217,6 @@ fn what_does_not_fit_is_refused_by_name() {
     }
     let error = renderer.record_draw(&mut rec, &views, &look, &Targets::new(&two[..1], SIZE)).unwrap_err();
     assert!(error.to_string().contains("1 of them, for 2 views"), "{error}");
-    drop((rec, renderer, picture, present, colour, depth, one));
+    drop((rec, renderer, picture, colour, depth, one));
     close(gpu);
 }

@@ -433,7 +433,7 @@ fn views_that_do_not_fit_are_refused_by_name() {
         record(views, layers).unwrap();
     }
     let few = record(&[left, right, left, right], 2).unwrap_err().to_string();
-    assert!(few.contains("needs 4 layers") && few.contains("has 2"), "{few}");
+    assert!(few.contains("view 2") && few.contains("layer 2") && few.contains("in 2 layers"), "{few}");
     assert!(record(&[left; 6], 6).unwrap_err().to_string().contains("views"));
     drop(renderer);
     close(gpu);
@@ -474,7 +474,7 @@ impl Stages {
         let bounds = Bounds::new(gpu).unwrap();
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
-        stages.clips.prepare(gpu, &peel, &dilate, clips, 2.0, 50.0, MAPS).unwrap();
+        stages.clips.prepare(gpu, &peel, &dilate, clips, Some(2.0), 50.0, MAPS).unwrap();
         let volumes = &stages.volumes;
         run(gpu, |rec| {
             stages.transfer.record(rec, transfer).unwrap();

@@ -1,5 +1,6 @@
 //! The kernel `rays` against its twin: bit for bit where a rule is whole numbers only, closely where it filters.
 
+use cao::drive::Take;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::volume_image;
@@ -63,11 +64,11 @@ impl State {
             let (kernel, field) = (&self.kernel, &self.field);
             kernel.record_directions(rec, plan).unwrap();
             if slices.is_empty() {
-                kernel.record(rec, field, plan, reference_mm, scope, b).unwrap();
+                kernel.record(rec, field, plan, reference_mm, scope, b, &Take::All).unwrap();
             }
             for slice in slices {
-                let (base, count) = (slice.start, slice.len() as u32);
-                kernel.record_part(rec, field, plan, reference_mm, scope, b, base, count).unwrap();
+                let take = Take::These(slice.clone());
+                kernel.record(rec, field, plan, reference_mm, scope, b, &take).unwrap();
                 rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite]);
             }
             rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);

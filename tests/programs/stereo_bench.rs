@@ -217,6 +217,44 @@ fn a_budget_for_drawing_chooses_scale_and_step() {
     assert_eq!(bench().run("--draw-budget-ms 0").code, Some(2));
 }
 
+/// Updates that fit no frame span several, whatever the method; with time for all none lags.
+#[test]
+fn a_budget_for_updates_says_what_frames_take_and_how_far_they_are_behind() {
+    let folder = bench();
+    let run = folder.run(&format!("{TINY} --methods rays --budget-ms 0.000001"));
+    assert_eq!(run.code, Some(0), "{}", run.err);
+    let row = run.out.lines().skip_while(|line| !line.starts_with("frames, ms")).nth(1).unwrap();
+    assert!(row.starts_with("rays") && row.split_whitespace().count() == 10, "{row}");
+    for (budget, lags) in [("0.000001", true), ("1000000", false)] {
+        let answer = folder.json(&format!("{TINY} --methods rays,lao,cao --budget-ms {budget}"));
+        for method in answer["methods"].as_array().unwrap() {
+            let [behind, wall] = ["frames_behind", "wall_ms"].map(|key| &method[key]);
+            assert_eq!(number(&behind["most"]) > 0.0, lags, "{method}");
+            let times = ["p50", "p90", "p99", "most"].map(|key| number(&wall[key]));
+            assert!(times[0] > 0.0 && times.is_sorted(), "{method}");
+            assert!(number(&method["update_ms"]["most"]) <= times[3], "{method}");
+        }
+    }
+    assert_eq!(folder.run("--budget-ms 0").code, Some(2));
+}
+
+/// Its layers are drawn in every frame, those of a mesh that only moves in none.
+#[test]
+fn a_mesh_that_deforms_is_timed() {
+    let folder = bench();
+    let torus = cao_model::mesh::TriangleMesh::torus(16, 8);
+    let vertices = torus.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
+    let faces = torus.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
+    folder.put("torus.obj", vertices.chain(faces).collect::<String>());
+    let clips = |flags: &str| {
+        let answer = folder.json(&format!("{TINY} --methods rays --clip torus.obj {flags}"));
+        (answer["deforms"].as_bool().unwrap(), number(&answer["methods"][0]["clips_ms"]))
+    };
+    let (moves, deforms) = (clips(""), clips("--deform"));
+    assert!(!moves.0 && deforms.0 && deforms.1 > 4.0 * moves.1, "{moves:?} {deforms:?}");
+    assert_eq!(folder.run("--deform").code, Some(2));
+}
+
 #[test]
 fn series_vary_one_setting_at_a_time() {
     let folder = bench();

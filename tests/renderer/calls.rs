@@ -2,8 +2,9 @@
 //! nothing to say, and works on as soon as it is told something sound. A run is short and always the same; CONTRIBUTING.md has the
 //! command for a long one.
 
-use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::Gpu;
+use cao::Budget;
+use cao::renderer::{COLOUR, LateViews, Over, Renderer, Target, Targets, Views};
+use cao_gpu::{Access, Format, Gpu, ImageDesc, ImageKind, ImageUse};
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
@@ -22,7 +23,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use std::sync::Arc;
 
-/// Sequences of a short run, a second each on the software driver.
+/// Sequences of a short run, of a hundred calls on average: two thousand calls.
 const CASES: u32 = 20;
 
 #[derive(Clone, Debug)]
@@ -34,8 +35,11 @@ enum Call {
     Update,
     Record,
     RecordAndDrop,
+    Within(Budget, f64),
     Invalidate,
     Draw(StereoRig, Look, [u32; 2]),
+    /// Into images of a host, of 16×16 pixels; whether views come late.
+    Into(StereoRig, Look, [u32; 2], Over, bool),
     Read,
 }
 
@@ -124,6 +128,13 @@ fn call() -> impl Strategy<Value = Call> {
     });
     let look = prop_oneof![Just(Look::default()), look];
     let size = select(vec![[0, 4], [1, 1], [9, 7], [16, 16], [u32::MAX, 1], [1, u32::MAX]]);
+    let (rig2, look2, size2) = (rig.clone(), look.clone(), size.clone());
+    let over = select(vec![Over::Nothing, Over::Scene]);
+    let budget = prop_oneof![
+        (0..9_u32).prop_map(Budget::Bricks),
+        Just(Budget::Bricks(u32::MAX)),
+        length().prop_map(Budget::Ms)
+    ];
     let place = prop::array::uniform3(prop_oneof![8 => 0..9_u32, 1 => Just(u32::MAX)]);
     prop_oneof![
         2 => transfer().prop_map(Call::Transfer),
@@ -134,8 +145,11 @@ fn call() -> impl Strategy<Value = Call> {
         4 => Just(Call::Update),
         1 => Just(Call::Record),
         1 => Just(Call::RecordAndDrop),
+        3 => (budget, any::<f64>()).prop_map(|(budget, ms)| Call::Within(budget, ms)),
         1 => Just(Call::Invalidate),
         3 => (rig, look, size).prop_map(|(rig, look, size)| Call::Draw(rig, look, size)),
+        2 => (rig2, look2, size2, over, any::<bool>())
+            .prop_map(|(rig, look, size, over, late)| Call::Into(rig, look, size, over, late)),
         1 => Just(Call::Read),
     ]
 }
@@ -183,8 +197,36 @@ fn act(
             renderer.invalidate();
             recorded?;
         }
+        Call::Within(budget, ms) => {
+            let mut rec = gpu.recorder("calls")?;
+            let updated = renderer.record_update_within(&mut rec, *budget)?;
+            rec.submit_and_wait()?;
+            renderer.updated(&updated, *ms)?;
+        }
         Call::Invalidate => renderer.invalidate(),
         Call::Draw(rig, look, size) => drop(renderer.draw(&rig.views(1.0, 0.1, 100.0)?, look, *size)?),
+        Call::Into(rig, look, size, over, late) => {
+            let views = rig.views(1.0, 0.1, 100.0)?;
+            let late = if *late { Some(LateViews::new(gpu, &views, look)?) } else { None };
+            let views = late.as_ref().map_or(Views::Now(&views), Views::Late);
+            let target = |format| {
+                let usage = ImageUse::ATTACHMENT | ImageUse::SAMPLED;
+                let desc = ImageDesc { dims: [16, 16, 1], layers: 2, format, kind: ImageKind::D2, usage };
+                gpu.image("target", &desc)
+            };
+            let (colour, depth) = (target(Format::Rgba16Float)?, target(Format::D32Float)?);
+            let targets = Target::layers(&colour, &depth, 2);
+            let targets: Vec<_> =
+                targets.into_iter().map(|target| Target { scene: target.depth, ..target }).collect();
+            let mut rec = gpu.recorder("calls")?;
+            rec.discard(&colour);
+            rec.discard(&depth);
+            rec.clear_image(&depth, [1.0; 4])?;
+            rec.barrier(&[Access::TransferWrite], &[Access::SampledRead, Access::AttachmentWrite]);
+            let targets = Targets { over: *over, ..Targets::new(&targets, *size) };
+            renderer.record_draw(&mut rec, views, look, &targets)?;
+            rec.submit_and_wait()?;
+        }
         Call::Read => drop((renderer.read_ambient()?, renderer.read_opacity()?, renderer.read_mask()?)),
     }
     Ok(())
@@ -194,7 +236,7 @@ proptest! {
     #![proptest_config(config(CASES))]
 
     #[test]
-    fn any_calls_are_done_or_refused(calls in prop::collection::vec(call(), 1..16)) {
+    fn any_calls_are_done_or_refused(calls in prop::collection::vec(call(), 1..200)) {
         let gpu = open();
         let volume = builtin_box("engine", [9, 10, 8], [1.0, 0.8, 1.5]).unwrap();
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();

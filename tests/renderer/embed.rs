@@ -60,6 +60,41 @@ fn recorded_updates_equal_updates_on_the_own_queue() {
     cao_testing::close(gpu);
 }
 
+/// Layers are those of a mesh's form: a larger one of the same form has the same, so that nothing is submitted. With dilation maps, those
+/// are made again.
+#[test]
+fn another_scale_of_a_clip_mesh_draws_no_layers() {
+    let gpu = cao_testing::open();
+    let mesh = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+    let scaled = |scale: Vec3| {
+        let mut clip = clip(mesh.clone(), 2.0);
+        clip.pose.scale = scale;
+        [clip]
+    };
+    let form = Vec3::new(4.0, 6.0, 5.0);
+    for method in methods() {
+        let mut r = renderer(&gpu, method);
+        r.set_clips(&scaled(form)).unwrap();
+        for times in [2.0, 0.5, 1.0] {
+            let before = gpu.counts().submissions;
+            r.set_clips(&scaled(times * form)).unwrap();
+            let submissions = gpu.counts().submissions - before;
+            assert_eq!(submissions, u64::from(method != Method::Rays), "{method:?} {times}");
+            r.update(&mut |_| ()).unwrap();
+            let mut fresh = renderer(&gpu, method);
+            fresh.set_clips(&scaled(times * form)).unwrap();
+            fresh.update(&mut |_| ()).unwrap();
+            assert!(r.read_opacity().unwrap() == fresh.read_opacity().unwrap(), "{method:?} {times}");
+            assert!(r.read_ambient().unwrap() == fresh.read_ambient().unwrap(), "{method:?} {times}");
+        }
+        // Another form has layers of its own.
+        let before = gpu.counts().submissions;
+        r.set_clips(&scaled(Vec3::new(4.0, 4.0, 6.0))).unwrap();
+        assert!(gpu.counts().submissions > before + 1, "{method:?}");
+    }
+    cao_testing::close(gpu);
+}
+
 #[test]
 fn recorded_frames_draw_both_eyes_into_the_hosts_images() {
     let gpu = cao_testing::open();

@@ -2,6 +2,7 @@
 
 mod adopt;
 mod bands;
+mod budget;
 mod calls;
 mod consistency;
 mod contextual;
@@ -12,6 +13,7 @@ mod external;
 mod failures;
 mod fit;
 mod frames;
+mod guest;
 mod host;
 mod host_image;
 mod leaks;

@@ -30,6 +30,7 @@ fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
 }
 
 /// A scene as an engine holds it, so that a renderer can be made for it anew.
+#[derive(Clone)]
 pub struct Scene {
     pub volume: Volume,
     pub transfer: TransferFunction,
@@ -58,7 +59,8 @@ impl Scene {
         self.edit_of(kind, random, renderer)
     }
 
-    fn edit_of(&mut self, kind: u64, random: &mut Random, renderer: &mut Renderer) -> String {
+    /// One whose kind is a number below 10; some of 6 are another method and back, which makes that method.
+    pub fn edit_of(&mut self, kind: u64, random: &mut Random, renderer: &mut Renderer) -> String {
         let pick = |random: &mut Random, n: usize| random.below(n as u64) as usize;
         match kind {
             // The transfer function, as a ramp or as labels of which some are shown.
@@ -170,7 +172,12 @@ impl Scene {
 
 /// A scene of its own size and spacing, without clips.
 pub fn scene(random: &mut Random, name: &str, method: Method) -> Scene {
-    let dims = std::array::from_fn(|_| 9 + random.below(30) as usize);
+    scene_up_to(39, random, name, method)
+}
+
+/// The same with fewer voxels than this along each edge.
+pub fn scene_up_to(edge: u64, random: &mut Random, name: &str, method: Method) -> Scene {
+    let dims = std::array::from_fn(|_| 9 + random.below(edge - 9) as usize);
     let spacing = match random.below(2) {
         0 => [1.0; 3],
         _ => std::array::from_fn(|_| f64::from(random.between(0.4, 2.0))),

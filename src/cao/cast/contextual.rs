@@ -5,9 +5,9 @@
 use super::full::recompute;
 use super::lao::{Bindings, Work};
 use super::volumes::{Kernels, Volumes};
-use super::{classified, local, over_bricks, unclipped};
+use super::{classified, clips, local, over_bricks, unclipped};
 use crate::Result;
-use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation};
+use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation, Written};
 use crate::drive::Part;
 use crate::field::bricks::Which;
 use crate::field::volume_image;
@@ -49,13 +49,14 @@ impl Contextual {
 }
 
 impl Ambient for Contextual {
-    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed, into: Option<&'a Image>) -> Vec<Part<'a>> {
         let (k, v) = (&self.kernels, &self.volumes);
         let mut parts = unclipped(k, v, on, changed);
+        // Whatever spans frames comes later, and sees the clips as they are now.
+        parts.push(classified(k, v, on));
         if changed.opacities || changed.anew {
             parts.extend(self.precompute(on));
         }
-        parts.push(classified(k, v, on));
         parts.push(Part::short(stages::BRICKS, |rec| {
             let (which, mask, before) = (Which::Changed, &v.mask, &v.changed_before);
             Ok(k.bricks.record(rec, &on.field, which, &v.opacity, mask, before, &v.list)?)
@@ -65,10 +66,18 @@ impl Ambient for Contextual {
             list: &v.list,
             mask: &v.mask,
             precomputed: &self.precomputed,
-            ambient: &v.ambient,
+            ambient: into.unwrap_or(&v.ambient),
         };
         parts.push(over_bricks(k, on, stages::CONTEXTUAL, Work::ByMask, bindings));
         parts
+    }
+
+    fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a> {
+        clips(&self.kernels, &self.volumes, on)
+    }
+
+    fn written(&self, _: Changed) -> Written<'_> {
+        Written { list: &self.volumes.list, all: false }
     }
 
     fn fields(&self) -> Fields<'_> {

@@ -1,9 +1,9 @@
 //! Local ambient occlusion of the clipped volume (CAO §3.4 step 1), every voxel at every change.
 
 use super::volumes::{Kernels, Volumes};
-use super::{classified, local, unclipped};
+use super::{classified, clips, local, unclipped};
 use crate::Result;
-use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation, Recomputed};
+use crate::ambient::{Ambient, Categories, Changed, Fields, Recomputation, Recomputed, Written};
 use crate::drive::{self, Pace, Part};
 use crate::field::bricks::BrickList;
 use crate::stages;
@@ -24,12 +24,22 @@ impl Full {
 }
 
 impl Ambient for Full {
-    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed, into: Option<&'a Image>) -> Vec<Part<'a>> {
         let (k, v) = (&self.kernels, &self.volumes);
         let mut parts = unclipped(k, v, on, changed);
         parts.push(classified(k, v, on));
-        parts.extend(local(k, v, on, (&v.opacity, &v.ambient), [stages::BRICKS, stages::LAO]));
+        let to = into.unwrap_or(&v.ambient);
+        parts.extend(local(k, v, on, (&v.opacity, to), [stages::BRICKS, stages::LAO]));
         parts
+    }
+
+    fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a> {
+        clips(&self.kernels, &self.volumes, on)
+    }
+
+    fn written(&self, _: Changed) -> Written<'_> {
+        // What is not listed holds 1 again.
+        Written { list: &self.volumes.list, all: true }
     }
 
     fn fields(&self) -> Fields<'_> {

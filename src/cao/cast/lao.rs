@@ -8,6 +8,7 @@
 //! One module serves the full computation and the contextual update: a voxel's value depends on nothing but V_o, and one
 //! module has one rounding, so both give the same bits.
 
+use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use bytemuck::Zeroable;
@@ -70,7 +71,7 @@ impl Lao {
         Ok(())
     }
 
-    /// Works on the whole list by one indirect dispatch.
+    /// Works on the list, or some of its bricks.
     #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
     pub fn record(
         &self,
@@ -81,34 +82,11 @@ impl Lao {
         scope: Scope,
         work: Work,
         bindings: Bindings,
+        take: &Take,
     ) -> Result<()> {
-        let params = params(field, occlusion, reference_mm, scope, work, 0);
-        rec.dispatch_indirect(
-            &self.pipeline,
-            &self.binds(bindings),
-            bytemuck::bytes_of(&params),
-            &bindings.list.buffer,
-            0,
-        )
-    }
-
-    /// Works on `count` bricks of the list from `base`, for callers that split a long computation.
-    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
-    pub fn record_part(
-        &self,
-        rec: &mut Recorder,
-        field: &Field,
-        occlusion: &Occlusion,
-        reference_mm: f32,
-        scope: Scope,
-        work: Work,
-        bindings: Bindings,
-        base: u32,
-        count: u32,
-    ) -> Result<()> {
-        let params = params(field, occlusion, reference_mm, scope, work, base);
-        let groups = crate::host::row_of_groups(count);
-        rec.dispatch(&self.pipeline, &self.binds(bindings), bytemuck::bytes_of(&params), groups)
+        let params = params(field, occlusion, reference_mm, scope, work, take.first());
+        let (binds, push) = (self.binds(bindings), bytemuck::bytes_of(&params));
+        take.dispatch(rec, &self.pipeline, &binds, push, &bindings.list.buffer)
     }
 
     fn binds<'a>(&'a self, b: Bindings<'a>) -> kernel::MainBindings<'a> {

@@ -15,13 +15,14 @@ use crate::field::bricks::Which;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Access, Image, Stage};
-use cao_model::settings::Scope;
+use cao_model::settings::{Scope, Setup};
 
 /// How far in mm dilation maps reach; the literal recipe dilates by the ray's length alone.
 pub(crate) fn map_radius(on: &Subject) -> f32 {
-    match on.setup.maps.literal {
-        true => on.setup.occlusion.reach(f64::from(on.field.min_spacing())),
-        false => Classify::reach(&on.field, &on.setup.occlusion),
+    let Setup { occlusion, maps, .. } = &on.wanted;
+    match maps.literal {
+        true => occlusion.reach(f64::from(on.field.min_spacing())),
+        false => Classify::reach(&on.field, occlusion),
     }
 }
 
@@ -44,13 +45,11 @@ fn unclipped<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject, changed: Chang
 /// V_o after clipping, and the category of every voxel (CAO §3.5 step 4).
 fn classified<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
     Part::short(stages::CLASSIFY, |rec| {
-        on.record_clips(rec)?;
+        let reach = Classify::reach(&on.field, &on.setup.occlusion);
+        on.record_clip_bricks(rec, &k.clip_bricks, reach, &v.clip_bricks)?;
         let count = &k.classify.count;
         rec.fill(count, 0, count.bytes(), 0)?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-        let reach = Classify::reach(&on.field, &on.setup.occlusion);
-        k.clip_bricks.record(rec, &on.field, &on.clip_set, reach, &v.clip_bricks)?;
-        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         k.classify.record(
             rec,
             &on.field,
@@ -66,6 +65,12 @@ fn classified<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
         rec.barrier(&[Access::StorageWrite], &[Access::SampledRead]);
         Ok(())
     })
+}
+
+/// The clips as pictures need them, and what they do to each brick.
+fn clips<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
+    let reach = Classify::reach(&on.field, &on.setup.occlusion);
+    Part::short(stages::CLIPS, move |rec| on.record_clip_bricks(rec, &k.clip_bricks, reach, &v.clip_bricks))
 }
 
 /// `to` from `from`: the bricks, then their rays, in two stages.
@@ -99,15 +104,9 @@ fn over_bricks<'a>(k: &'a Kernels, on: &'a Subject, stage: Stage, work: Work, b:
         * setup.occlusion.rays.count() as f64
         * f64::from(setup.occlusion.samples(f64::from(field.min_spacing())).max(1));
     let first = (4e6 / brick_samples).clamp(1.0, 1e6) as u32;
-    Part::items(stage, b.list.items(field), first, move |rec, items| {
-        let (occlusion, reference_mm, scope) = (&setup.occlusion, on.reference_mm(), setup.scope);
-        match items {
-            None => k.lao.record(rec, field, occlusion, reference_mm, scope, work, b)?,
-            Some(items) => {
-                let (base, count) = (items.start, items.len() as u32);
-                k.lao.record_part(rec, field, occlusion, reference_mm, scope, work, b, base, count)?;
-            }
-        }
+    Part::items(stage, b.list.items(field), first, move |rec, take| {
+        let (occlusion, reference_mm, scope) = (&setup.occlusion, on.ambient_mm, setup.scope);
+        k.lao.record(rec, field, occlusion, reference_mm, scope, work, b, take)?;
         // What follows V_PAO writes the mask that these rays may have read, and another list.
         rec.barrier(
             &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],

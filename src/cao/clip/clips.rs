@@ -1,8 +1,9 @@
 //! The clips on the device (`spirv/shared/clips.wgsl`): shapes at their poses, and for meshes their depth layers and dilation
 //! maps (CAO §3.2–§3.4).
 //!
-//! The clip camera moves rigidly with a mesh, so its layers are drawn once and serve every translation and rotation; a new
-//! scale, radius or mesh draws them again.
+//! The clip camera moves rigidly with a mesh, so its layers are drawn once and serve every translation and rotation, and every scale of the
+//! same shape: they are those of the mesh with its x axis as long as in its file, and the camera grows with it. Another ratio of the axes, or
+//! another mesh, draws them again; another radius or scale makes other dilation maps, for methods that have them.
 
 use crate::clip::dilate::Dilate;
 use crate::clip::peel::{Layers, Peel};
@@ -42,17 +43,29 @@ pub struct MeshClip {
     pub literal: bool,
 }
 
-/// The layers of a mesh at one scale and margin.
+/// The layers of a mesh at one ratio of its axes and one margin.
 struct Peeled {
     mesh: Arc<TriangleMesh>,
-    scale: Vec3,
+    shape: Vec3,
     margin: f32,
     settings: MapSettings,
     layers: Layers,
 }
 
-/// Mesh, scale, whether the outside is hidden, radius of the dilation.
-type Wanted<'a> = (&'a Arc<TriangleMesh>, Vec3, bool, f32);
+/// A mesh as a clip shows it.
+struct Wanted<'a> {
+    mesh: &'a Arc<TriangleMesh>,
+    /// What its vertices are scaled by for the layers, and how much larger than there it stands.
+    shape: Vec3,
+    larger: f32,
+    /// The outside is hidden.
+    keep: bool,
+    /// Radius of the dilation.
+    radius: Option<f32>,
+}
+
+/// Mesh, scale, side and radius of each mesh that dilation maps were made for.
+type MadeFor = Vec<(Vec3, f32, bool, Option<f32>)>;
 
 /// The clips of a scene in device memory.
 pub struct ClipSet {
@@ -64,8 +77,7 @@ pub struct ClipSet {
     pub dilation: Buffer,
     peeled: Vec<Peeled>,
     meshes: Vec<MeshClip>,
-    /// What the maps were made for: shape and side of each mesh clip, radius.
-    made_for: Vec<(Vec3, bool, f32)>,
+    made_for: MadeFor,
 }
 
 impl ClipSet {
@@ -81,9 +93,9 @@ impl ClipSet {
         })
     }
 
-    /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only
-    /// translations and rotations changed. `radius` in mm is the reach of a change (ray length, footprint and sample cell),
-    /// `half_mm` half the volume's diagonal.
+    /// Draws the layers and dilation maps that these clips need and that are not there yet; does nothing when only poses changed that
+    /// need no others. `radius` in mm is the reach of a change (ray length, footprint and sample cell), `None` where no dilation maps are
+    /// needed, `half_mm` half the volume's diagonal.
     /// Uses the device's queue and waits for it when there is something to draw; returns the times of the stages.
     #[expect(clippy::too_many_arguments, reason = "kernels, clips and settings, each named once")]
     pub fn prepare(
@@ -92,33 +104,28 @@ impl ClipSet {
         peel: &Peel,
         dilate: &Dilate,
         clips: &[Clip],
-        radius: f32,
+        radius: Option<f32>,
         half_mm: f32,
         settings: MapSettings,
     ) -> Result<Timings> {
         check(clips, half_mm)?;
         settings.check()?;
-        let mut wanted = Vec::new();
-        for clip in clips {
-            if let Shape::Mesh(mesh) = &clip.shape {
-                let rounding = if settings.literal { 0.0 } else { clip.rounding_mm(half_mm, radius) };
-                let radius = radius + rounding;
-                wanted.push((mesh, clip.pose.scale, clip.mode == Mode::Keep, radius));
-            }
-        }
-        let key: Vec<_> = wanted.iter().map(|&(_, scale, keep, radius)| (scale, keep, radius)).collect();
+        let wanted: Vec<_> =
+            clips.iter().filter_map(|clip| Wanted::of(clip, radius, half_mm, settings)).collect();
+        let key: MadeFor =
+            wanted.iter().map(|want| (want.shape, want.larger, want.keep, want.radius)).collect();
         // Only the literal recipe's layers leave room for the dilation.
-        let margin = if settings.literal { radius } else { 0.0 };
-        let same_layers = |have: &Peeled, (mesh, scale, ..): &Wanted| {
-            Arc::ptr_eq(&have.mesh, mesh)
-                && have.scale == *scale
+        let margin = if settings.literal { radius.unwrap_or(0.0) } else { 0.0 };
+        let same_layers = |have: &Peeled, want: &Wanted| {
+            Arc::ptr_eq(&have.mesh, want.mesh)
+                && have.shape == want.shape
                 && have.margin == margin
                 && have.settings == settings
         };
-        let unchanged = key == self.made_for
+        let drawn = self.meshes.len() == wanted.len()
             && self.peeled.len() == wanted.len()
             && self.peeled.iter().zip(&wanted).all(|(have, want)| same_layers(have, want));
-        if unchanged {
+        if drawn && key == self.made_for {
             return Ok(Timings::new());
         }
         // Nothing is there until all of it is, whatever fails on the way.
@@ -126,55 +133,82 @@ impl ClipSet {
         self.meshes.clear();
 
         let mut timings = Timings::new();
-        let mut peeled = Vec::new();
-        for want in &wanted {
-            let (mesh, scale, ..) = *want;
-            let found = self.peeled.iter().position(|have| same_layers(have, want));
-            peeled.push(match found {
-                Some(index) => self.peeled.swap_remove(index),
-                None => {
-                    // Layer pairs have their meaning only where there is an inside.
-                    mesh.check_solid()?;
-                    let camera = ClipCamera::around(mesh, scale, margin, settings.resolution);
-                    let layers = peel.run(gpu, mesh, scale, camera, settings.pairs)?;
-                    timings.push(stages::PEEL, layers.milliseconds);
-                    Peeled { mesh: mesh.clone(), scale, margin, settings, layers }
-                }
-            });
+        if !drawn {
+            let mut peeled = Vec::new();
+            for want in &wanted {
+                let found = self.peeled.iter().position(|have| same_layers(have, want));
+                peeled.push(match found {
+                    Some(index) => self.peeled.swap_remove(index),
+                    None => {
+                        let (mesh, shape) = (want.mesh, want.shape);
+                        // Layer pairs have their meaning only where there is an inside.
+                        mesh.check_solid()?;
+                        let camera = ClipCamera::around(mesh, shape, margin, settings.resolution);
+                        let layers = peel.run(gpu, mesh, shape, camera, settings.pairs)?;
+                        timings.push(stages::PEEL, layers.milliseconds);
+                        Peeled { mesh: mesh.clone(), shape, margin, settings, layers }
+                    }
+                });
+            }
+            self.peeled = peeled;
         }
-        self.peeled = peeled;
-        let mut meshes = Vec::new();
+        let mut meshes: Vec<MeshClip> = Vec::new();
         let (mut layers_at, mut dilation_at) = (0, 0);
-        for (have, &(_, _, keep, radius)) in self.peeled.iter().zip(&wanted) {
-            let (pairs, camera) = (have.layers.pairs, have.layers.camera);
+        for (have, want) in self.peeled.iter().zip(&wanted) {
+            let (pairs, camera) = (have.layers.pairs, have.layers.camera.larger(want.larger));
             meshes.push(MeshClip {
                 camera,
                 pairs,
-                cells: if settings.literal { camera } else { camera.widened(radius, settings.cells) },
+                cells: match want.radius {
+                    Some(radius) if !settings.literal => camera.widened(radius, settings.cells),
+                    Some(_) => camera,
+                    None => ClipCamera { resolution: 0, ..camera },
+                },
                 layers_at,
                 dilation_at,
                 blocks_at: 0,
-                keep,
+                keep: want.keep,
                 literal: settings.literal,
             });
             layers_at += 2 * pairs * settings.resolution * settings.resolution;
             dilation_at += 2 * pairs * settings.cells * settings.cells;
         }
-        if meshes.is_empty() {
-            return Ok(timings);
+        // Bounds of blocks are behind all layers.
+        let edge = settings.resolution.div_ceil(layers::BLOCK);
+        for mesh in &mut meshes {
+            mesh.blocks_at = layers_at;
+            layers_at += mesh.pairs * layers::BLOCK_BOUNDS * edge * edge;
         }
-        let mut all: Vec<f32> =
-            self.peeled.iter().flat_map(|have| have.layers.depth.iter().copied()).collect();
-        for (mesh, have) in meshes.iter_mut().zip(&self.peeled) {
-            mesh.blocks_at = all.len() as u32;
-            all.extend(block_bounds(&have.layers.depth, settings.resolution as usize));
+        if !drawn && !meshes.is_empty() {
+            let depths = || self.peeled.iter().map(|have| &have.layers.depth);
+            let mut all: Vec<f32> = depths().flatten().copied().collect();
+            all.extend(depths().flat_map(|depth| block_bounds(depth, settings.resolution as usize)));
+            self.layers = crate::host::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
         }
-        self.layers = crate::host::device_buffer(gpu, "clip layers", bytemuck::cast_slice(&all))?;
-        self.dilation = gpu.buffer("dilation maps", 4 * u64::from(dilation_at), BufferUse::Device)?;
+        if radius.is_some() && !meshes.is_empty() {
+            timings.extend(self.dilate(gpu, dilate, &meshes, &wanted, dilation_at, settings)?);
+        }
+        self.meshes = meshes;
+        self.made_for = key;
+        Ok(timings)
+    }
+
+    /// Makes the dilation maps, of so many f32.
+    fn dilate(
+        &mut self,
+        gpu: &Gpu,
+        dilate: &Dilate,
+        meshes: &[MeshClip],
+        wanted: &[Wanted],
+        room: u32,
+        settings: MapSettings,
+    ) -> Result<Timings> {
+        self.dilation = gpu.buffer("dilation maps", 4 * u64::from(room), BufferUse::Device)?;
         let most = meshes.iter().map(|mesh| mesh.pairs).max().unwrap_or(1);
         let blocks = Dilate::blocks(gpu, settings.cells, most)?;
         let mut rec = gpu.recorder("dilate")?;
-        for (mesh, &(.., radius)) in meshes.iter().zip(&wanted) {
+        for (mesh, want) in meshes.iter().zip(wanted) {
+            let Some(radius) = want.radius else { continue };
             rec.barrier(
                 &[Access::StorageRead, Access::StorageWrite],
                 &[Access::StorageRead, Access::StorageWrite],
@@ -183,10 +217,7 @@ impl ClipSet {
             dilate.record(&mut rec, mesh, radius, &self.layers, &blocks, &self.dilation)?;
             rec.end_stage()?;
         }
-        timings.extend(rec.submit_and_wait()?);
-        self.meshes = meshes;
-        self.made_for = key;
-        Ok(timings)
+        Ok(rec.submit_and_wait()?)
     }
 
     /// Whether the maps of all meshes among these clips are there.
@@ -241,6 +272,24 @@ impl ClipSet {
         rec.update(&self.clips, 0, bytemuck::bytes_of(&data))?;
         rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::GraphicsRead]);
         Ok(())
+    }
+}
+
+impl<'a> Wanted<'a> {
+    /// What a mesh clip needs; `None` of other clips.
+    fn of(clip: &'a Clip, radius: Option<f32>, half_mm: f32, settings: MapSettings) -> Option<Self> {
+        let Shape::Mesh(mesh) = &clip.shape else { return None };
+        let scale = clip.pose.scale;
+        // The literal recipe's room is in mm.
+        let larger = if settings.literal { 1.0 } else { scale.x };
+        let rounding = |radius| if settings.literal { 0.0 } else { clip.rounding_mm(half_mm, radius) };
+        Some(Self {
+            mesh,
+            shape: scale / larger,
+            larger,
+            keep: clip.mode == Mode::Keep,
+            radius: radius.map(|radius| radius + rounding(radius)),
+        })
     }
 }
 

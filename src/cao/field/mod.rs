@@ -5,6 +5,7 @@
 //! f32, the one loss there is. Devices need not filter 16-bit UNORM texels; where one cannot, 16-bit values become f32 texels.
 
 pub mod bricks;
+pub mod commit;
 pub mod near;
 pub mod occupancy;
 pub mod opacity;

@@ -5,9 +5,10 @@
 //! write a voxel. Cost: N·M reads of V_o a voxel at most; a ray ends when it is dark or leaves the volume. Forms that were timed on a
 //! GPU: `benches/runs/2026-11-26-h200-rays-prototype/`.
 
+use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
-use crate::host::{device_buffer, row_of_groups};
+use crate::host::device_buffer;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
 use cao_kernels::rays as kernel;
@@ -161,7 +162,8 @@ impl Rays {
         Ok(())
     }
 
-    /// Works on the whole list by one indirect dispatch, along the directions written last. `opacity` is per `reference_mm`.
+    /// Works on the list, or some of its bricks, along the directions written last. `opacity` is per `reference_mm`.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -170,32 +172,11 @@ impl Rays {
         reference_mm: f32,
         scope: Scope,
         b: Bindings,
+        take: &Take,
     ) -> Result<()> {
-        let params = params(field, plan, reference_mm, scope, 0);
-        rec.dispatch_indirect(
-            self.pipeline(plan),
-            &self.binds(b),
-            bytemuck::bytes_of(&params),
-            &b.list.buffer,
-            0,
-        )
-    }
-
-    /// Works on `count` bricks of the list from `base`, for callers that split a long computation.
-    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
-    pub fn record_part(
-        &self,
-        rec: &mut Recorder,
-        field: &Field,
-        plan: &RayPlan,
-        reference_mm: f32,
-        scope: Scope,
-        b: Bindings,
-        base: u32,
-        count: u32,
-    ) -> Result<()> {
-        let params = params(field, plan, reference_mm, scope, base);
-        rec.dispatch(self.pipeline(plan), &self.binds(b), bytemuck::bytes_of(&params), row_of_groups(count))
+        let params = params(field, plan, reference_mm, scope, take.first());
+        let (binds, push) = (self.binds(b), bytemuck::bytes_of(&params));
+        take.dispatch(rec, self.pipeline(plan), &binds, push, &b.list.buffer)
     }
 
     fn pipeline(&self, plan: &RayPlan) -> &Pipeline {

@@ -7,7 +7,7 @@
 
 use super::rays::{Bindings, RayPlan, Rays};
 use crate::Result;
-use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed};
+use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed, Written};
 use crate::clip::carve::{self, Carve};
 use crate::clip::classify::{AFFECTED, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
@@ -19,6 +19,7 @@ use crate::host::read_buffer;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Timings};
+use cao_model::settings::Setup;
 
 /// Device memory of one scene, beside the volume itself.
 struct Volumes {
@@ -126,9 +127,7 @@ impl Traced {
         let (k, v) = (&self.kernels, &self.volumes);
         let all = [Access::StorageRead, Access::StorageWrite];
         Part::short(stages::CARVE, move |rec| {
-            on.record_clips(rec)?;
-            k.clip_bricks.record(rec, &on.field, &on.clip_set, 0.0, &v.clip_bricks)?;
-            rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+            on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks)?;
             k.carve.record(
                 rec,
                 &on.field,
@@ -184,16 +183,10 @@ impl Traced {
         let on = to.on;
         // The first slice is small enough for any device.
         let first = (4e6 / plan.brick_samples()).clamp(1.0, 1e6) as u32;
-        Part::items(stages::RAYS, to.list.items(&on.field), first, move |rec, items| {
+        Part::items(stages::RAYS, to.list.items(&on.field), first, move |rec, take| {
             let b = Bindings { opacity: &v.opacity, list: to.list, ambient: to.ambient };
-            let (field, reference_mm, scope) = (&on.field, on.reference_mm(), on.setup.scope);
-            match items {
-                None => k.rays.record(rec, field, plan, reference_mm, scope, b)?,
-                Some(items) => {
-                    let (base, count) = (items.start, items.len() as u32);
-                    k.rays.record_part(rec, field, plan, reference_mm, scope, b, base, count)?;
-                }
-            }
+            let (field, reference_mm, scope) = (&on.field, on.ambient_mm, on.setup.scope);
+            k.rays.record(rec, field, plan, reference_mm, scope, b, take)?;
             rec.barrier(
                 &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
                 &[Access::SampledRead, Access::StorageWrite, Access::TransferWrite],
@@ -209,15 +202,30 @@ impl Ambient for Traced {
         Ok(())
     }
 
-    fn update<'a>(&'a self, on: &'a Subject, changed: Changed) -> Vec<Part<'a>> {
+    fn accepts(&self, on: &Subject, setup: &Setup) -> Result<()> {
+        RayPlan::new(on.field.spacing, &setup.occlusion)?;
+        Ok(())
+    }
+
+    fn update<'a>(&'a self, on: &'a Subject, changed: Changed, into: Option<&'a Image>) -> Vec<Part<'a>> {
         let v = &self.volumes;
-        let to = Target { on, todo: &v.todo, list: &v.list, ambient: &v.ambient };
+        let to = Target { on, todo: &v.todo, list: &v.list, ambient: into.unwrap_or(&v.ambient) };
         let mut parts = Vec::new();
         if changed.anew {
             parts.push(self.directions());
         }
         parts.extend([self.carve(on, changed), self.choose(to, changed.anew), self.trace(to)]);
         parts
+    }
+
+    fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a> {
+        let (k, v) = (&self.kernels, &self.volumes);
+        Part::short(stages::CLIPS, move |rec| on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks))
+    }
+
+    fn written(&self, changed: Changed) -> Written<'_> {
+        // Anew the others are ones again.
+        Written { list: &self.volumes.list, all: changed.anew }
     }
 
     fn fields(&self) -> Fields<'_> {

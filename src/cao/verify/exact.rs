@@ -9,7 +9,7 @@ use cao_gpu::Timings;
 /// a value. Also returns the time of the full recomputation. Refuses while the ambient volume is out of date. Uses the device's queue
 /// and waits for it.
 pub fn verify(renderer: &Renderer, progress: &mut dyn FnMut(f64)) -> Result<(Difference, Timings)> {
-    renderer.current()?;
+    renderer.complete()?;
     let expected = renderer.unoccluded()?;
     let (subject, ambient) = (renderer.subject(), renderer.ambient());
     let (full, timings) = ambient.recompute(subject, &expected, progress)?;

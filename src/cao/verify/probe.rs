@@ -1,6 +1,7 @@
 //! Cast rays of other settings in a few bricks of a scene, and take their time: what a planner measures (measure.md §5).
 
 use crate::cast::lao::{Bindings, Lao, Work};
+use crate::drive::Take;
 use crate::field::bricks::BrickList;
 use crate::field::volume_image;
 use crate::field::{BRICK, Field};
@@ -119,19 +120,9 @@ impl<'a> Probe<'a> {
                 &[Access::StorageRead, Access::StorageWrite, Access::SampledRead],
             );
             rec.stage(PROBE)?;
-            let (field, work, count) = (self.field, Work::Full, bricks.len() as u32);
+            let (field, work, all) = (self.field, Work::Full, Take::These(0..bricks.len() as u32));
             let (reference_mm, scope) = (self.reference_mm, self.scope);
-            self.lao.record_part(
-                &mut rec,
-                field,
-                occlusion,
-                reference_mm,
-                scope,
-                work,
-                bindings,
-                0,
-                count,
-            )?;
+            self.lao.record(&mut rec, field, occlusion, reference_mm, scope, work, bindings, &all)?;
             rec.end_stage()?;
         }
         let start = Instant::now();

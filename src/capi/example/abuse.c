@@ -429,15 +429,13 @@ static void recordings(const Host *host, CaoDevice device, CaoRenderer renderer,
     CaoDevice other;
     CaoDeviceInfo lend = device_info(host);
     FINE(cao_device_adopt(&lend, &other));
-    for (int what = 0; what < 2; what++) {
-        commands = host_begin(host);
-        FINE(cao_recording_begin(other, commands, &recording));
-        if (what == 0)
-            REFUSED(CAO_RESULT_BAD_VALUE, cao_recording_acquire(recording, image));
-        else
-            REFUSED(CAO_RESULT_BAD_VALUE, cao_recording_update(recording, renderer));
-        given_up(host, recording, commands);
-    }
+    commands = host_begin(host);
+    FINE(cao_recording_begin(other, commands, &recording));
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_recording_update(recording, renderer));
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_recording_draw(recording, renderer, &good));
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_recording_acquire(recording, image));
+    REFUSED(CAO_RESULT_IN_USE, cao_device_free(other));
+    given_up(host, recording, commands);
     FINE(cao_device_free(other));
 
     /* In order; then once more what is over. */

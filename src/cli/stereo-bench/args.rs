@@ -31,6 +31,10 @@ pub struct Cli {
     /// the pixels along each axis and samples a voxel apart
     #[arg(long, value_name = "T", value_parser = milliseconds)]
     pub draw_budget_ms: Option<f32>,
+    /// What the update of the ambient volume is to take of a frame: where it does not fit it spans frames, which show the newest clip with the
+    /// ambient volume of before. Says percentiles of frames and how many the volume is behind
+    #[arg(long, value_name = "T", value_parser = milliseconds)]
+    pub budget_ms: Option<f32>,
     /// Frames of one run that count; the path closes after 90 [default: 90, on a software driver 10]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: Option<u32>,
@@ -43,6 +47,9 @@ pub struct Cli {
     /// Shape that moves through the volume: plane, box, sphere, cylinder, cone, torus, or a closed mesh file.obj; none for no clip
     #[arg(long, value_name = "SHAPE|MESH.obj", default_value = "sphere")]
     pub clip: OsString,
+    /// Give the clip mesh another form in every frame, so that its depth layers are drawn again
+    #[arg(long)]
+    pub deform: bool,
     /// Compute every voxel, not only those that a sample with opacity can touch
     #[arg(long)]
     pub all_voxels: bool,
@@ -82,6 +89,7 @@ Examples:
   stereo-bench builtin:skeleton:512 --radius-mm 50 --rays 54 --size 2064x2208
   stereo-bench --methods lao,cao --scale rays,radius,views --csv frames.csv
   stereo-bench --scale size,rays,radius,resolution,views --save
+  stereo-bench --methods rays --budget-ms 4 --frames 90     a clip that moves, updates of at most 4 ms a frame
   stereo-bench --bars --data DIR               minutes on a software driver
 
 The path: in 90 frames the head goes once round an ellipse of 20 degrees of

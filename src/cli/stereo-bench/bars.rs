@@ -11,6 +11,7 @@ use anyhow::{Context, Result};
 use cao::cast::lao::{Bindings, Work};
 use cao::cast::volumes::{Kernels, Volumes};
 use cao::draw::picture::Picture;
+use cao::drive::Take;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::opacity::Opacity;
@@ -220,20 +221,10 @@ impl Baseline {
         let mut rec = gpu.recorder("lao (unit)")?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite]);
         rec.stage(LAO_UNIT)?;
-        let (field, count) = (&self.field, self.bricks);
+        let (field, all) = (&self.field, Take::These(0..self.bricks));
         let (occlusion, reference_mm) = (&self.occlusion, self.reference_mm);
         let (scope, work) = (Scope::All, Work::Full);
-        self.kernels.lao.record_part(
-            &mut rec,
-            field,
-            occlusion,
-            reference_mm,
-            scope,
-            work,
-            bindings,
-            0,
-            count,
-        )?;
+        self.kernels.lao.record(&mut rec, field, occlusion, reference_mm, scope, work, bindings, &all)?;
         rec.end_stage()?;
         Ok(rec.submit_and_wait()?.total() * self.scale)
     }

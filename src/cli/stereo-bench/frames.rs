@@ -3,6 +3,7 @@
 use super::path;
 use super::way::Way;
 use anyhow::{Context, Result};
+use cao::Budget;
 use cao::ambient::Categories;
 use cao::draw::picture::Picture;
 use cao::renderer::{COLOUR, Drawn, Renderer};
@@ -40,11 +41,15 @@ pub struct Plan {
     pub methods: Vec<Way>,
     /// What moves through the volume.
     pub clip: Option<Shape>,
+    /// Whether it is another mesh in every frame.
+    pub deform: bool,
     pub frames: u32,
     pub runs: u32,
     pub warm_up: u32,
     /// What the drawing of a frame is to take, ms.
     pub draw_budget_ms: Option<f32>,
+    /// What its update is to take, ms.
+    pub budget_ms: Option<f32>,
 }
 
 impl Plan {
@@ -62,10 +67,16 @@ pub struct Frame {
     pub stages: Timings,
     /// What the clip did to the voxels.
     pub categories: Categories,
+    /// Time in which the clips were set: where a mesh has another form, with all that is made of it.
+    pub clips: f64,
     /// Time in which the processor recorded the update.
     pub recording: f64,
     /// What the update asks of Vulkan.
     pub asked: Counts,
+    /// Time of the update on the device; of the whole frame where that has no timestamps.
+    pub update: f64,
+    /// Frames since the scene that the ambient volume shows was the newest.
+    pub behind: u64,
     /// What was drawn; less than all of the picture where there is a budget.
     pub drawn: Drawn,
 }
@@ -162,7 +173,12 @@ impl<'a> Runner<'a> {
 
     fn move_clip(&mut self, plan: &Plan, frame: i64) -> Result<()> {
         let size_mm = self.configuration.input.volume.size_mm();
-        let clips: Vec<_> = plan.clip.iter().map(|shape| path::clip(shape, size_mm, frame)).collect();
+        let mut clips: Vec<_> = plan.clip.iter().map(|shape| path::clip(shape, size_mm, frame)).collect();
+        if plan.deform {
+            for clip in &mut clips {
+                clip.shape = path::deformed(&clip.shape, frame)?;
+            }
+        }
         Ok(self.renderer.set_clips(&clips)?)
     }
 
@@ -175,9 +191,13 @@ impl<'a> Runner<'a> {
 
         let start = Instant::now();
         self.move_clip(plan, frame)?;
+        let clips = start.elapsed().as_secs_f64() * 1e3;
         let mut rec = gpu.recorder("frame")?;
         let before = Instant::now();
-        self.renderer.record_update(&mut rec)?;
+        let updated = match plan.budget_ms {
+            Some(ms) => Some(self.renderer.record_update_within(&mut rec, Budget::Ms(ms))?),
+            None => self.renderer.record_update(&mut rec).map(|()| None)?,
+        };
         let (recording, asked) = (before.elapsed().as_secs_f64() * 1e3, rec.counts());
         let drawn = self.renderer.record_picture(&mut rec, &views, &look, &self.target)?;
         let stages = rec.submit_and_wait()?;
@@ -185,8 +205,18 @@ impl<'a> Runner<'a> {
         // Of a device without timestamps the whole frame is known.
         self.renderer.drew(&drawn, if stages.is_empty() { wall } else { stages.of(Phase::Draw) });
 
-        Ok(Frame { wall, stages, categories: self.renderer.categories()?, recording, asked, drawn })
+        let update = if stages.is_empty() { wall } else { update_ms(&stages) };
+        if let Some(updated) = updated {
+            self.renderer.updated(&updated, update)?;
+        }
+        let (categories, behind) = (self.renderer.categories()?, self.renderer.stale().frames);
+        Ok(Frame { wall, stages, categories, clips, recording, asked, update, behind, drawn })
     }
+}
+
+/// All but the picture.
+fn update_ms(stages: &Timings) -> f64 {
+    stages.iter().filter(|timing| timing.stage != cao::stages::RAYCAST).map(|timing| timing.ms).sum()
 }
 
 #[cfg(test)]
@@ -204,11 +234,14 @@ mod tests {
             wall: 8.0,
             stages,
             categories: Categories::default(),
+            clips: 0.0,
             recording: 0.0,
             asked: Counts::default(),
+            update: 5.5,
+            behind: 0,
             drawn: Drawn { size: [1, 1], step_mm: 1.0, quality: Quality::FULL },
         };
-        assert_eq!(frame.parts(), [1.0, 4.5, 2.0, 0.5]);
+        assert_eq!((frame.parts(), update_ms(&frame.stages)), ([1.0, 4.5, 2.0, 0.5], 5.5));
         // Clocks of device and host may disagree by a little; no time is negative.
         frame.wall = 7.0;
         assert_eq!(frame.parts()[3], 0.0);

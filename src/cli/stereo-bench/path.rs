@@ -11,9 +11,11 @@
 
 use anyhow::Result;
 use cao_model::clip::{Clip, Pose, Shape};
+use cao_model::mesh::TriangleMesh;
 use cao_model::view::{StereoRig, View, with_insets};
 use glam::Vec3;
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 /// Frames after which the path closes: a second at 90 Hz.
 pub const PERIOD: u32 = 90;
@@ -65,6 +67,19 @@ pub fn clip(shape: &Shape, size_mm: [f64; 3], frame: i64) -> Clip {
     Clip { pose, ..Clip::remove(shape.clone()) }
 }
 
+/// The form of a mesh in a frame: a wave along z that swells and shrinks it by 15 %, three times a turn. Other shapes have one form.
+pub fn deformed(shape: &Shape, frame: i64) -> Result<Shape> {
+    let Shape::Mesh(mesh) = shape else { return Ok(shape.clone()) };
+    let (low, high) = mesh.bounds();
+    let (middle, size) = (0.5 * (low + high), high - low);
+    let wave = |v: &Vec3| {
+        let along = TAU * (v.z - middle.z) / size.z.max(f32::MIN_POSITIVE);
+        middle + (*v - middle) * (1.0 + 0.15 * (3.0 * TAU * turn(frame) + along).sin())
+    };
+    let vertices: Vec<_> = mesh.vertices.iter().map(wave).collect();
+    Ok(Shape::Mesh(Arc::new(TriangleMesh::new(mesh.name.clone(), &vertices, &mesh.triangles)?)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +96,23 @@ mod tests {
             // Smoothly: no more than a twentieth of the volume a frame.
             assert!(now.1.translate_mm.distance(next.1.translate_mm) < 6.0, "frame {frame} jumps");
         }
+    }
+
+    #[test]
+    fn a_mesh_has_another_form_in_every_frame_and_stays_a_solid() {
+        let shape = Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12)));
+        let form = |frame| match deformed(&shape, frame).unwrap() {
+            Shape::Mesh(mesh) => mesh,
+            other => panic!("{other:?}"),
+        };
+        let solid = form(0);
+        for frame in 1..30 {
+            let (now, before) = (form(frame), form(frame - 1));
+            assert!(now.check_solid().is_ok() && now.vertices != before.vertices, "frame {frame}");
+            assert_eq!(now.triangles, solid.triangles);
+        }
+        assert_eq!(*form(PERIOD.into()), *solid);
+        assert!(matches!(deformed(&Shape::Sphere, 3), Ok(Shape::Sphere)));
     }
 
     #[test]

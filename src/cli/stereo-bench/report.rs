@@ -97,20 +97,23 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
     line("            medians, and their share of the median frame (the paper's Fig. 9)".into());
     line(String::new());
     line(format!(
-        "{:<12}{:>20}{:>20}{:>20}{:>20}",
-        "update, host", "recording, ms", "commands", "barriers", "calls"
+        "{:<12}{:>20}{:>20}{:>20}{:>20}{:>20}",
+        "update, host", "clips, ms", "recording, ms", "commands", "barriers", "calls"
     ));
     for m in all {
         let of = |of: fn(&Frame) -> f64| median(&m.frames().map(of).collect::<Vec<_>>());
-        let ms = of(|frame| frame.recording);
+        let [clips, ms] = [of(|frame| frame.clips), of(|frame| frame.recording)];
         let [commands, barriers, calls] = [
             of(|frame| frame.asked.commands as f64),
             of(|frame| frame.asked.barriers as f64),
             of(|frame| frame.asked.calls as f64),
         ];
-        line(format!("{:<12}{ms:>20.3}{commands:>20}{barriers:>20}{calls:>20}", m.method.name()));
+        line(format!(
+            "{:<12}{clips:>20.3}{ms:>20.3}{commands:>20}{barriers:>20}{calls:>20}",
+            m.method.name()
+        ));
     }
-    line("            medians; one submission a frame, which the host makes".into());
+    line("            medians; one submission a frame, which the host makes, and those of a clip mesh of another form".into());
     if let Some(budget) = plan.draw_budget_ms {
         line(String::new());
         line(format!(
@@ -136,6 +139,34 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
             ));
         }
         line("            what --draw-budget-ms chose: share of the pixels along each axis, distance of samples; medians, least, most".into());
+    }
+    if let Some(budget) = plan.budget_ms {
+        line(String::new());
+        line(format!(
+            "{:<12}{:>10}{:>10}{:>10}{:>10}{:>10}{:>22}{:>24}",
+            "frames, ms",
+            "budget",
+            "median",
+            "90 %",
+            "99 %",
+            "most",
+            "update, 99 %, most",
+            "behind, median, most"
+        ));
+        for m in all {
+            let of = |of: fn(&Frame) -> f64| m.frames().map(of).collect::<Vec<_>>();
+            let (frames, updates) = (of(|frame| frame.wall), of(|frame| frame.update));
+            let [p50, p90, p99, most] = PERCENTILES.map(|p| percentile(&frames, p));
+            let [.., p99_update, most_update] = PERCENTILES.map(|p| percentile(&updates, p));
+            let behind = of(|frame| frame.behind as f64);
+            let update = format!("{p99_update:.2} {most_update:.2}");
+            let behind = format!("{:.0} {:.0}", median(&behind), percentile(&behind, 100.0));
+            line(format!(
+                "{:<12}{budget:>10.2}{p50:>10.2}{p90:>10.2}{p99:>10.2}{most:>10.2}{update:>22}{behind:>24}",
+                m.method.name()
+            ));
+        }
+        line("            what --budget-ms did to frames, and to updates alone; behind: frames by which the ambient volume lags the clip".into());
     }
     if all.iter().any(|m| m.frames().any(|frame| frame.stages.is_empty())) {
         line("            this device has no timestamps: all of a frame is overhead".into());
@@ -241,14 +272,26 @@ fn method_json(c: &Configuration, m: &Measured, all: &[Measured]) -> Value {
         "run_medians_ms": run_medians(m),
         "lao_over_this": speedup(m, all),
         "affected_share": affected(m),
+        "clips_ms": median(&m.frames().map(|frame| frame.clips).collect::<Vec<_>>()),
         "recording_ms": median(&m.frames().map(|frame| frame.recording).collect::<Vec<_>>()),
         "commands": median(&m.frames().map(|frame| frame.asked.commands as f64).collect::<Vec<_>>()),
         "calls": median(&m.frames().map(|frame| frame.asked.calls as f64).collect::<Vec<_>>()),
+        "update_ms": percentiles(&m.frames().map(|frame| frame.update).collect::<Vec<_>>()),
+        "wall_ms": percentiles(&walls),
+        "frames_behind": percentiles(&m.frames().map(|frame| frame.behind as f64).collect::<Vec<_>>()),
         "drawn_scale": median(&m.frames().map(|frame| frame.drawn.quality.scale.into()).collect::<Vec<_>>()),
         "drawn_step_mm": median(&m.frames().map(|frame| frame.drawn.step_mm.into()).collect::<Vec<_>>()),
         "parts_ms": parts,
         "stages_ms": stages(m),
     })
+}
+
+/// Of frames under a budget.
+const PERCENTILES: [f64; 4] = [50.0, 90.0, 99.0, 100.0];
+
+fn percentiles(values: &[f64]) -> Value {
+    let [p50, p90, p99, most] = PERCENTILES.map(|p| percentile(values, p));
+    json!({ "p50": p50, "p90": p90, "p99": p99, "most": most })
 }
 
 /// Median time of every stage, by the stage's own name; a stage that a frame lacks took no time in it.

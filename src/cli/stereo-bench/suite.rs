@@ -9,6 +9,7 @@ use cao_cli::args::{self, setup, shape, usage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_gpu::DeviceKind;
+use cao_model::clip::Shape;
 use cao_model::error::shown_path;
 use cao_model::methods::Method;
 use serde_json::{Map, json};
@@ -93,7 +94,8 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     out.volume(&input.name, &input.volume);
     out.occlusion(&methods.join(" "), setup, &input.volume);
     out.line(format!("views     {views} of {} x {} pixels, in one dispatch", size[0], size[1]));
-    out.line(format!("clip      {}", shown_path(&cli.clip)));
+    let form = if cli.deform { ", of another form in every frame" } else { "" };
+    out.line(format!("clip      {}{form}", shown_path(&cli.clip)));
     out.line(match cli.all_voxels {
         true => "voxels    all",
         false => "voxels    those that a sample with opacity can touch",
@@ -101,6 +103,7 @@ fn say(cli: &Cli, out: &mut Out, plan: &Plan, results: &[Outcome]) {
     out.line(report::tables(plan, &base.measured).trim_end());
     out.json(json!({
         "clip": cli.clip.to_string_lossy(),
+        "deforms": cli.deform,
         "all_voxels": cli.all_voxels,
         "runs": plan.runs,
         "frames_a_run": plan.frames,
@@ -157,8 +160,12 @@ fn plan(cli: &Cli) -> Result<Plan> {
         false => Some(shape(&cli.clip).with_context(|| format!("--clip {}", shown_path(&cli.clip)))?),
     };
     let methods = cli.methods.clone();
-    let draw_budget_ms = cli.draw_budget_ms;
-    Ok(Plan { methods, clip, frames: PERIOD, runs: cli.runs, warm_up: cli.warm_up, draw_budget_ms })
+    let (draw_budget_ms, budget_ms) = (cli.draw_budget_ms, cli.budget_ms);
+    if cli.deform && !matches!(clip, Some(Shape::Mesh(_))) {
+        return Err(usage("--deform needs a mesh: --clip MESH.obj"));
+    }
+    let (frames, runs, warm_up, deform) = (PERIOD, cli.runs, cli.warm_up, cli.deform);
+    Ok(Plan { methods, clip, deform, frames, runs, warm_up, draw_budget_ms, budget_ms })
 }
 
 fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {
