@@ -275,7 +275,10 @@ impl Renderer {
     }
 
     /// How occlusion is computed, or will be when an update that spans frames has ended.
-    #[expect(clippy::misnamed_getters, reason = "the one that was set, not the one that a running update has")]
+    #[expect(
+        clippy::misnamed_getters,
+        reason = "the one that was set, not the one that a running update has"
+    )]
     pub fn setup(&self) -> &Setup {
         &self.subject.wanted
     }
