@@ -222,8 +222,19 @@ impl Gpu {
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family, 0) };
         let queue = Some(queue);
-        let parts =
-            Parts { entry, instance, physical, info, device, family, queue, debug, log, compute_only: false, plain: options.plain };
+        let parts = Parts {
+            entry,
+            instance,
+            physical,
+            info,
+            device,
+            family,
+            queue,
+            debug,
+            log,
+            compute_only: false,
+            plain: options.plain,
+        };
         // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
         parts.build(Some(Owned { messenger }))
     }
@@ -415,7 +426,8 @@ fn calls(instance: &ash::Instance, device: &ash::Device) -> Result<ash::DeviceFn
 
 impl Parts {
     fn build(self, owned: Option<Owned>) -> Result<Gpu> {
-        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only, plain } = self;
+        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only, plain } =
+            self;
         // SAFETY: `physical` was enumerated from this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let does = families.get(family as usize).map_or(vk::QueueFlags::empty(), |f| f.queue_flags);

@@ -235,8 +235,8 @@ fn a_lost_device_is_told_from_other_failures() {
 #[test]
 fn without_anything_optional_the_picture_is_the_same() {
     let validation = validated();
-    let [all, plain] =
-        [false, true].map(|plain| Gpu::open(&OpenOptions { validation, plain, ..OpenOptions::default() }).unwrap());
+    let [all, plain] = [false, true]
+        .map(|plain| Gpu::open(&OpenOptions { validation, plain, ..OpenOptions::default() }).unwrap());
     let bytes = builtin_box("fruit", [14, 16, 12], [1.0; 3]).unwrap();
     let (low, high) = bytes.range();
     let level = |i: usize| (bytes.value(i) - low) / (high - low);
@@ -265,7 +265,8 @@ fn without_anything_optional_the_picture_is_the_same() {
             };
             let ((found, none), (expected, some)) = (draw(&mut here), draw(&mut there));
             assert!(none == 0.0 && some > 0.0, "{none} ms, {some} ms");
-            for (found, expected) in found.iter().flatten().flatten().zip(expected.iter().flatten().flatten()) {
+            for (found, expected) in found.iter().flatten().flatten().zip(expected.iter().flatten().flatten())
+            {
                 // Half a level of 255: 16 bits of values and factors, magnified by the transfer function.
                 assert!((found - expected).abs() < 0.002, "{}: {found} for {expected}", method.name());
             }
@@ -286,7 +287,9 @@ fn resizes_and_formats_leave_nothing_behind() {
     let views = eyes(&volume, 30.0);
     let mut reports = Vec::new();
     for _ in 0..3 {
-        for (n, format) in [Format::Rgba8Srgb, Format::Rgba16Float, Format::Bgra8Unorm].into_iter().enumerate() {
+        for (n, format) in
+            [Format::Rgba8Srgb, Format::Rgba16Float, Format::Bgra8Unorm].into_iter().enumerate()
+        {
             for count in [2, 1] {
                 let size = [16 + 8 * n as u32, 30 - 4 * n as u32];
                 let target = |format| {

@@ -201,8 +201,7 @@ impl Host {
         // SAFETY: the command buffer is recording and of this device, the semaphore alive.
         unsafe {
             self.device.end_command_buffer(cmd).unwrap();
-            let (semaphores, after, then, commands) =
-                ([semaphore], [after], then.as_slice(), [cmd]);
+            let (semaphores, after, then, commands) = ([semaphore], [after], then.as_slice(), [cmd]);
             let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
                 .wait_semaphore_values(&after)
                 .signal_semaphore_values(then);
