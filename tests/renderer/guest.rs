@@ -258,7 +258,7 @@ fn without_anything_optional_the_picture_is_the_same() {
             }
             let mut here = make(&plain).unwrap();
             let views = eyes(volume, 30.0);
-            let mut draw = |renderer: &mut Renderer| {
+            let draw = |renderer: &mut Renderer| {
                 renderer.set_clips(&[Clip::remove(Shape::Sphere)]).unwrap();
                 let times = renderer.update(&mut |_| ()).unwrap();
                 (renderer.draw(&views, &Look::default(), [20, 18]).unwrap().0.colour, times.total())
