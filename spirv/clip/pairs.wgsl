@@ -116,12 +116,14 @@ fn finish(@builtin(global_invocation_id) id: vec3<u32>) {
         atomicAdd(&peeled.open, 1u);
         atomicMax(&peeled.from_first, size - index);
     }
-    if pixel.count > params.pairs {
+    // One that has not ended may still be one of nothing.
+    let count = pixel.count - select(0u, 1u, pixel.winding != 0);
+    if count > params.pairs {
         atomicAdd(&peeled.beyond, 1u);
     }
-    if pixel.count > atomicLoad(&peeled.most) {
-        atomicMax(&peeled.most, pixel.count);
-        atomicMax(&peeled.pairs, min(pixel.count, params.pairs));
+    if count > atomicLoad(&peeled.most) {
+        atomicMax(&peeled.most, count);
+        atomicMax(&peeled.pairs, min(count, params.pairs));
     }
 }
 

@@ -8,7 +8,7 @@ struct Peeled {
     // Passes that drew anything; pixels at which the last one did.
     surfaces: u32,
     seen: u32,
-    // Most pairs of a pixel, and pixels with more than are kept.
+    // Most pairs of a pixel that have ended, and pixels with more than are kept.
     most: u32,
     beyond: u32,
     // Pixels at which fronts and backs differ in number; pixels from the first of them to the map's end.

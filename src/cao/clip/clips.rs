@@ -81,8 +81,6 @@ struct Mesh {
     /// The camera that its layers are drawn from.
     camera: ClipCamera,
     corners: Corners,
-    /// Surfaces that are looked for.
-    passes: u32,
     /// What was found, on the device.
     peeled: Buffer,
     map: MeshClip,
@@ -107,8 +105,10 @@ struct Wanted<'a> {
 #[derive(Clone)]
 struct Report {
     found: Buffer,
-    /// Place among the meshes, mesh, settings and passes of each.
-    meshes: Vec<(usize, Arc<TriangleMesh>, MapSettings, u32)>,
+    /// Surfaces that were looked for.
+    passes: u32,
+    /// Place among the meshes, mesh and settings of each.
+    meshes: Vec<(usize, Arc<TriangleMesh>, MapSettings)>,
 }
 
 /// Memory for making maps.
@@ -130,6 +130,8 @@ pub struct ClipSet {
     pub dilation: Buffer,
     meshes: Vec<Mesh>,
     scratch: Option<Arc<Scratch>>,
+    /// Surfaces that are looked for: as many as any mesh had so far.
+    passes: u32,
     /// Of the recording that is being made.
     recorded: Option<Report>,
     /// Of those that were made.
@@ -155,6 +157,7 @@ impl ClipSet {
             dilation: gpu.buffer("dilation maps", 16, BufferUse::Device)?,
             meshes: Vec::new(),
             scratch: None,
+            passes: 0,
             recorded: None,
             late: Vec::new(),
         })
@@ -180,6 +183,7 @@ impl ClipSet {
         }
         let mut planned = self.clone();
         planned.meshes.clear();
+        planned.passes = self.passes.max(first_passes(settings.pairs));
         for (place, want) in wanted.iter().enumerate() {
             // Only the literal recipe's layers leave room for the dilation.
             let margin = if settings.literal { radius.unwrap_or(0.0) } else { 0.0 };
@@ -225,11 +229,10 @@ impl ClipSet {
         settings: MapSettings,
     ) -> Result<Mesh> {
         let (mesh, shape) = (want.mesh, want.shape);
-        let known = |have: &&Mesh| {
+        let same = |have: &Mesh| {
             have.mesh.triangles == mesh.triangles && have.mesh.vertices.len() == mesh.vertices.len()
         };
-        let known = self.meshes.iter().find(known);
-        if known.is_none() {
+        if !self.meshes.iter().any(same) {
             // Layer pairs have their meaning only where there is an inside.
             mesh.check_solid()?;
         }
@@ -237,10 +240,6 @@ impl ClipSet {
             let problem = format!("has a vertex at {vertex}; coordinates must be finite");
             return Err(cao_model::Error::Mesh { name: mesh.name.clone(), problem }.into());
         }
-        let passes = match known {
-            Some(have) if have.settings == settings => have.passes,
-            _ => first_passes(settings.pairs),
-        };
         let camera = ClipCamera::around(mesh, shape, margin, settings.resolution);
         Ok(Mesh {
             mesh: mesh.clone(),
@@ -249,7 +248,6 @@ impl ClipSet {
             settings,
             camera,
             corners: Corners::new(gpu, mesh)?,
-            passes,
             peeled: Pairs::peeled(gpu)?,
             map: MeshClip::new(camera, want, place, settings),
             radius: want.radius,
@@ -280,7 +278,7 @@ impl ClipSet {
                 corners: &mesh.corners,
                 scale: mesh.shape,
                 camera: mesh.camera,
-                passes: mesh.passes,
+                passes: self.passes,
                 cells: mesh.settings.cells,
                 peeled: &mesh.peeled,
             };
@@ -294,7 +292,7 @@ impl ClipSet {
             peel.record(rec, &peeling, &to, &scratch.work)?;
             rec.end_stage()?;
             rec.barrier(&ANYTHING, &ANYTHING);
-            meshes.push((place, mesh.mesh.clone(), mesh.settings, mesh.passes));
+            meshes.push((place, mesh.mesh.clone(), mesh.settings));
         }
         for mesh in self.meshes.iter().filter(|mesh| mesh.todo != Todo::Nothing) {
             let (Some(radius), Some(blocks)) = (mesh.radius, &scratch.blocks) else { continue };
@@ -311,7 +309,7 @@ impl ClipSet {
                 rec.copy_buffer(&self.meshes[*place].peeled, 0, &found, BYTES * at, BYTES)?;
             }
             rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-            self.recorded = Some(Report { found, meshes });
+            self.recorded = Some(Report { found, passes: self.passes, meshes });
         }
         Ok(())
     }
@@ -336,24 +334,20 @@ impl ClipSet {
         self.late = running;
         for report in run {
             let all: Vec<Peeled> = bytemuck::pod_collect_to_vec(&report.found.read(0, report.found.bytes())?);
-            for (found, (place, mesh, settings, passes)) in all.iter().zip(report.meshes) {
-                let judged = verdict(found, &mesh, settings.resolution, settings.pairs, passes);
-                let now = self.meshes.get_mut(place).filter(|now| now.settings == settings);
+            for (found, (place, mesh, settings)) in all.iter().zip(report.meshes) {
+                let judged = verdict(found, &mesh, settings.resolution, settings.pairs, report.passes);
+                if matches!(judged, Ok(Verdict::Complete)) {
+                    continue;
+                }
+                // Another one that came after it has a report of its own.
+                let same = |now: &&mut Mesh| Arc::ptr_eq(&now.mesh, &mesh) && now.settings == settings;
+                if let Some(now) = self.meshes.get_mut(place).filter(same) {
+                    (now.todo, again) = (Todo::All, true);
+                }
                 match judged {
+                    Ok(Verdict::More(passes)) => self.passes = self.passes.max(passes),
                     Ok(Verdict::Complete) => (),
-                    Ok(Verdict::More(more)) => {
-                        let same =
-                            |now: &&mut Mesh| now.passes < more && now.mesh.triangles == mesh.triangles;
-                        if let Some(now) = now.filter(same) {
-                            (now.passes, now.todo, again) = (more, Todo::All, true);
-                        }
-                    }
-                    Err(error) => {
-                        if let Some(now) = now.filter(|now| Arc::ptr_eq(&now.mesh, &mesh)) {
-                            now.todo = Todo::All;
-                        }
-                        refused.get_or_insert(error);
-                    }
+                    Err(error) => refused = refused.or(Some(error)),
                 }
             }
         }

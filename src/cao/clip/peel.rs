@@ -119,9 +119,10 @@ pub enum Verdict {
     More(u32),
 }
 
-/// Passes of a mesh that nobody has peeled: one for each surface of as many pairs, and one that finds nothing.
+/// Passes over a mesh of which nothing is known: one for each surface of one pair more than are kept, so that one too many is seen, and one
+/// that finds nothing.
 pub fn first_passes(pairs: u32) -> u32 {
-    2 * pairs + 1
+    2 * pairs + 3
 }
 
 /// What the passes over a mesh found, of which at most `max_pairs` layer pairs are kept.
@@ -136,14 +137,14 @@ pub fn verdict(
 ) -> Result<Verdict> {
     let pixels = edge * edge;
     let Peeled { surfaces, seen, most, beyond, open, from_first, .. } = *found;
-    let problem = if surfaces >= passes && passes <= MAX_SURFACES {
+    let problem = if surfaces >= passes && passes <= MAX_SURFACES && most <= max_pairs {
         return Ok(Verdict::More((2 * passes).min(MAX_SURFACES + 1)));
-    } else if surfaces >= passes {
+    } else if surfaces >= passes && most <= max_pairs {
         format!(
             "more than {MAX_SURFACES} surfaces lie behind one another at {seen} of {pixels} pixels of the clip camera; \
              join its parts into fewer in a mesh editor"
         )
-    } else if open > 0 {
+    } else if surfaces < passes && open > 0 {
         let first = pixels - from_first.min(pixels);
         format!(
             "front and back faces differ in number at {open} of {pixels} pixels of the clip camera, first at ({}, {}): the \
@@ -157,8 +158,10 @@ pub fn verdict(
             true => format!(", or allow up to {MAX_PAIRS} pairs"),
             false => String::new(),
         };
+        // A pair that has ended stays one, whatever lies behind it.
+        let least = if surfaces < passes { "" } else { "at least " };
         format!(
-            "more than {max_pairs} layer pairs at {beyond} of {pixels} pixels of the clip camera: {most} found; split the mesh into \
+            "more than {max_pairs} layer pairs at {beyond} of {pixels} pixels of the clip camera: {least}{most} found; split the mesh into \
              several clips (up to {}), or turn the mesh's vertices in its file{more}",
             Clip::MAX
         )

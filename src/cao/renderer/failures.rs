@@ -5,7 +5,7 @@ use crate::ambient::{Fields, Recomputation, Written};
 use crate::build::Budget;
 use crate::drive::Part;
 use crate::stages;
-use cao_gpu::OpenOptions;
+use cao_gpu::{OpenOptions, Timings};
 use cao_model::METHODS;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::Shape;

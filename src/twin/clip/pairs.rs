@@ -16,7 +16,7 @@ pub struct Found {
     pub maps: Vec<Vec<f32>>,
     /// Surfaces before the first that no pixel has.
     pub surfaces: usize,
-    /// Most pairs of a pixel, and pixels with more than are kept.
+    /// Most pairs of a pixel that have ended, and pixels with more than are kept.
     pub most: usize,
     /// See `most`.
     pub beyond: usize,
@@ -66,6 +66,8 @@ pub fn pairs(surfaces: &[Surface], max: usize) -> Found {
         }
         if winding != 0 {
             open.push(pixel);
+            // It has not ended.
+            count -= 1;
         }
         most = most.max(count);
         beyond += usize::from(count > max);
