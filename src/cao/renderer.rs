@@ -8,7 +8,6 @@
 //! so that a host embeds them in its frame; `update` and `draw` do the same on the device's own queue and wait.
 
 use crate::ambient::{Ambient, Categories, Changed};
-use crate::clip::clips::ClipSet;
 use crate::draw::bounds::Bounds;
 use crate::draw::brick_distance::BrickDistance;
 use crate::draw::budget::Controller;
@@ -135,7 +134,7 @@ impl Renderer {
             self.subject.setup = setup;
         }
         self.subject.wanted = setup;
-        let planned = self.planned_clips();
+        let planned = self.subject.planned_clips(method::map_radius(&self.subject));
         let held = planned.and_then(|planned| {
             if !waits {
                 self.hold(before.0.method)?;
@@ -187,7 +186,7 @@ impl Renderer {
     /// lies behind the last pair is not cut.
     pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
-        match self.planned_clips() {
+        match self.subject.planned_clips(method::map_radius(&self.subject)) {
             Ok(planned) => self.subject.clip_set = planned,
             Err(error) => {
                 self.subject.clips = before;
@@ -196,10 +195,6 @@ impl Renderer {
         }
         self.edited(Changed { clips: true, ..Changed::NOTHING });
         Ok(())
-    }
-
-    fn planned_clips(&self) -> Result<ClipSet> {
-        self.subject.planned_clips(method::map_radius(&self.subject))
     }
 
     /// An image of the form of V_AO that holds 1. Uses the device's queue and waits for it.

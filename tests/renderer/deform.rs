@@ -184,7 +184,7 @@ fn frames_in_flight_have_forms_of_their_own() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
     for method in methods() {
-        let mut hosted = renderer(&gpu, method, 2);
+        let mut hosted = renderer(&gpu, method, 4);
         let forms = [0.0, 1.0, 2.5].map(|phase| [clip(&deformed(&concave(), phase), Mode::Remove, 1.0, 6.0)]);
         let mut record = |clips: &[Clip]| {
             hosted.set_clips(clips)?;
@@ -196,11 +196,11 @@ fn frames_in_flight_have_forms_of_their_own() {
         };
         let frames =
             forms.each_ref().map(|clips| record(clips).map_err(|e: cao::Error| e.to_string()).unwrap());
-        let bad = [clip(&Arc::new(row_of_boxes(3)), Mode::Remove, 0.0, 3.0)];
+        let bad = [clip(&Arc::new(row_of_boxes(5)), Mode::Remove, 0.0, 3.0)];
         let (last, recorded) = record(&bad).unwrap();
         for ((cmd, _), clips) in frames.iter().zip(&forms) {
             host.submit_and_wait(&[*cmd]);
-            let mut own = renderer(&gpu, method, 2);
+            let mut own = renderer(&gpu, method, 4);
             own.set_clips(clips).unwrap();
             own.update(&mut |_| ()).unwrap();
             assert_same(&hosted, &own, &format!("{method:?}"));
