@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Set-up shared by tools/demo, tools/test, tools/get-data, tools/peers and .ci/run; sourced, not run.
+# Set-up shared by tools/capi, tools/demo, tools/test, tools/get-data, tools/peers and .ci/run; sourced, not run.
 #
 # It looks first and installs only what is missing, so a second run touches no package manager. Progress goes to
 # stderr in short lines; a package manager's own output is shown only when it fails.
@@ -23,6 +23,10 @@ driver        mesa-vulkan-drivers      mesa-vulkan-drivers       vulkan-swrast  
 validation    vulkan-validationlayers  vulkan-validation-layers  vulkan-validation-layers  Vulkan_validation_layer
 spirv         spirv-tools              spirv-tools               spirv-tools               spirv-val
 python        python3_python3-venv     python3                   python                    Python_3_with_venv
+headers       libvulkan-dev_libc6-dev  vulkan-headers_vulkan-loader-devel  vulkan-headers_vulkan-icd-loader  Vulkan_headers
+valgrind      valgrind                 valgrind                  valgrind                  valgrind
+pkgconfig     pkg-config               pkgconf                   pkgconf                   pkg-config
+cmake         cmake                    cmake                     cmake                     CMake
 opengl        libegl1_libgl1           mesa-libEGL_mesa-libGL    mesa_libglvnd             OpenGL_without_a_window_(EGL)
 TABLE
 }
@@ -122,6 +126,14 @@ has_validation() {
 }
 
 has_spirv() { have spirv-val; }
+has_valgrind() { have valgrind; }
+has_pkgconfig() { have pkg-config; }
+has_cmake() { have cmake; }
+# Those of 1.3, and the library's name for linkers.
+has_headers() {
+  printf '#include <vulkan/vulkan.h>\nint main(void) { return VK_API_VERSION_1_3 == 0 || !vkCreateInstance; }\n' |
+    cc -x c - -lvulkan -o /dev/null 2>/dev/null
+}
 
 # Ends the script unless a Rust is there that can build this package.
 require_rust() {

@@ -1,25 +1,22 @@
 // The ambient factor that a place of a ray shows: of the air in front of its surface, V_AO a voxel h out along its own rise.
 //
-//   A(x) = sum w m V_AO / sum w m    over the eight voxels round y = x + h g / max(|g|, LEAST_RISE),   g = change of V_AO a length h at x
+//   A(x) = sum w V'        over the eight voxels round y = x + h g / max(|g|, LEAST_RISE),   g = change of V_AO a length h at x
 //
-// w are linear weights; m is 0 where a voxel holds 1, as those do that need no value (method.md section 5.3), else 1. A place with opacity
-// lies between voxels with a value, and y at most a voxel off along each axis, so that it has one beside it. At the place
-// itself a wall's own matter takes a part of its light that edges do not lose (method.md section 10). In: index position,
-// `ambient`, `edge`, `frame`. Cost: 6 filtered reads and 8 of texels.
+// w are linear weights; V' is V_AO, but of voxels that hold 1, as those do that need no value (method.md section 5.3), what V_AO
+// and g at x make of y: so nothing jumps where a moving clip takes a voxel its value. At the place itself a wall's own
+// matter takes a part of its light that edges do not lose (method.md section 10). In: index position, `ambient`,
+// `edge`, `frame`. Cost: 7 filtered reads and 8 of texels.
 
 // Rise a voxel below which the way out shortens, to none where there is no surface. At a wall it is 0.2 and more.
 const LEAST_RISE = 0.1;
-
-// What a 1 weighs that stands for the air where no voxel beside it has a value.
-const LEAST_WEIGHT = 1e-4;
 
 // The field itself, ones included: they are out of the matter.
 fn ambient_between(position: vec3<f32>) -> f32 {
     return textureSampleLevel(ambient, edge, (position + 0.5) / frame.dims.xyz, 0.0).r;
 }
 
-// Index coordinates of the air in front of a place.
-fn air_of(position: vec3<f32>) -> vec3<f32> {
+// The air in front of a place: its index coordinates, and V_AO there by how it rises at the place.
+fn air_of(position: vec3<f32>) -> vec4<f32> {
     let x = vec3(1.0, 0.0, 0.0);
     let voxel = min(frame.spacing.x, min(frame.spacing.y, frame.spacing.z)) / frame.spacing.xyz;
     let rise = 0.5 * voxel * vec3(
@@ -27,7 +24,8 @@ fn air_of(position: vec3<f32>) -> vec3<f32> {
         ambient_between(position + x.yxy) - ambient_between(position - x.yxy),
         ambient_between(position + x.yyx) - ambient_between(position - x.yyx),
     );
-    return position + voxel * rise / max(length(rise), LEAST_RISE);
+    let out = rise / max(length(rise), LEAST_RISE);
+    return vec4(position + voxel * out, min(ambient_between(position) + dot(rise, out), 1.0));
 }
 
 fn factor_at(x: i32, y: i32, z: i32) -> f32 {
@@ -41,15 +39,13 @@ fn factor_at(x: i32, y: i32, z: i32) -> f32 {
 fn ambient_at(position: vec3<f32>) -> f32 {
     let air = air_of(round(position * 256.0) / 256.0);
     let last = vec3<i32>(frame.dims.xyz) - 1;
-    let l = clamp(vec3<i32>(floor(air)), vec3(0), last);
-    let h = clamp(vec3<i32>(floor(air)) + 1, vec3(0), last);
-    let w = fract(air);
+    let l = clamp(vec3<i32>(floor(air.xyz)), vec3(0), last);
+    let h = clamp(vec3<i32>(floor(air.xyz)) + 1, vec3(0), last);
+    let w = fract(air.xyz);
     let low = vec4(factor_at(l.x, l.y, l.z), factor_at(h.x, l.y, l.z), factor_at(l.x, h.y, l.z), factor_at(h.x, h.y, l.z));
     let high = vec4(factor_at(l.x, l.y, h.z), factor_at(h.x, l.y, h.z), factor_at(l.x, h.y, h.z), factor_at(h.x, h.y, h.z));
     let across = vec4((1.0 - w.x) * (1.0 - w.y), w.x * (1.0 - w.y), (1.0 - w.x) * w.y, w.x * w.y);
-    let weight_low = select((1.0 - w.z) * across, vec4(0.0), low >= vec4(1.0));
-    let weight_high = select(w.z * across, vec4(0.0), high >= vec4(1.0));
-    let sum = dot(weight_low, low) + dot(weight_high, high);
-    let weight = dot(weight_low + weight_high, vec4(1.0));
-    return (sum + LEAST_WEIGHT) / (weight + LEAST_WEIGHT);
+    let risen_low = select(low, vec4(air.w), low >= vec4(1.0));
+    let risen_high = select(high, vec4(air.w), high >= vec4(1.0));
+    return mix(dot(across, risen_low), dot(across, risen_high), w.z);
 }

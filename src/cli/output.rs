@@ -178,7 +178,7 @@ fn print(text: &str) -> Result<()> {
 /// # Errors
 /// There is none, or it lacks something.
 pub fn open_gpu(global: &Global) -> Result<Gpu> {
-    Ok(Gpu::open(&OpenOptions { device: global.device.clone(), validation: global.validate })?)
+    Ok(Gpu::open(&OpenOptions { device: global.device.clone(), validation: global.validate, plain: false })?)
 }
 
 /// Fails when the validation layer said anything.

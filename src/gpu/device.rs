@@ -34,6 +34,8 @@ pub struct OpenOptions {
     /// across submits only if the environment has `VK_LAYER_ENABLES` as `.cargo/config.toml` sets it, which this never does: other threads
     /// may be reading the environment.
     pub validation: bool,
+    /// Do without all that is optional ([`Gpu::optional`]), as on a device that has none of it.
+    pub plain: bool,
 }
 
 /// Handles of a host that already uses Vulkan. They stay the host's: nothing here ever destroys them.
@@ -71,6 +73,8 @@ pub(crate) struct Inner {
     pub queue_family: u32,
     /// Commands may draw.
     pub graphics: bool,
+    /// What is optional is not used.
+    pub plain: bool,
     /// Valid bits of a timestamp; 0 if the queue has none.
     pub timestamp_mask: u64,
     pub info: DeviceInfo,
@@ -218,8 +222,19 @@ impl Gpu {
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family, 0) };
         let queue = Some(queue);
-        let parts =
-            Parts { entry, instance, physical, info, device, family, queue, debug, log, compute_only: false };
+        let parts = Parts {
+            entry,
+            instance,
+            physical,
+            info,
+            device,
+            family,
+            queue,
+            debug,
+            log,
+            compute_only: false,
+            plain: options.plain,
+        };
         // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
         parts.build(Some(Owned { messenger }))
     }
@@ -276,6 +291,7 @@ impl Gpu {
             debug: false,
             log: ValidationLog::default(),
             compute_only: host.compute_only,
+            plain: false,
         };
         parts.build(None)
     }
@@ -312,12 +328,22 @@ impl Gpu {
 
     /// Whether images of this format can be sampled with linear filtering here.
     pub fn filters(&self, format: Format) -> bool {
-        feature::filters(&self.0.instance, self.0.physical, format.vk())
+        self.may(format) && feature::filters(&self.0.instance, self.0.physical, format.vk())
     }
 
     /// Whether kernels can read and write images of this format.
     pub fn stores(&self, format: Format) -> bool {
-        feature::stores(&self.0.instance, self.0.physical, format.vk())
+        self.may(format) && feature::stores(&self.0.instance, self.0.physical, format.vk())
+    }
+
+    /// Whether this format may be used at all: `R16_UNORM` is optional.
+    fn may(&self, format: Format) -> bool {
+        !self.0.plain || format != Format::R16Unorm
+    }
+
+    /// Whether all that is optional is done without ([`OpenOptions::plain`]).
+    pub fn plain(&self) -> bool {
+        self.0.plain
     }
 
     /// Messages of the validation layer so far; empty without validation.
@@ -372,6 +398,7 @@ struct Parts {
     debug: bool,
     log: ValidationLog,
     compute_only: bool,
+    plain: bool,
 }
 
 /// Calls of Vulkan 1.3, and whether the device has all that is used: an instance below 1.3 hides them behind the names that they had as
@@ -399,11 +426,12 @@ fn calls(instance: &ash::Instance, device: &ash::Device) -> Result<ash::DeviceFn
 
 impl Parts {
     fn build(self, owned: Option<Owned>) -> Result<Gpu> {
-        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only } = self;
+        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only, plain } =
+            self;
         // SAFETY: `physical` was enumerated from this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let does = families.get(family as usize).map_or(vk::QueueFlags::empty(), |f| f.queue_flags);
-        let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits);
+        let bits = families.get(family as usize).map_or(0, |f| f.timestamp_valid_bits) * u32::from(!plain);
         let computes = || match does.contains(vk::QueueFlags::COMPUTE) {
             true => Ok(()),
             false => {
@@ -427,10 +455,11 @@ impl Parts {
         Ok(Gpu(Arc::new(Inner {
             memory: ManuallyDrop::new(memory),
             push_descriptor: ash::khr::push_descriptor::Device::new(&instance, &device),
-            debug: debug.then(|| ash::ext::debug_utils::Device::new(&instance, &device)),
+            debug: (debug && !plain).then(|| ash::ext::debug_utils::Device::new(&instance, &device)),
             queue: queue.map(Mutex::new),
             queue_family: family,
             graphics: does.contains(vk::QueueFlags::GRAPHICS) && !compute_only,
+            plain,
             v13,
             timestamp_mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0),
             info,

@@ -7,6 +7,7 @@ use cao::draw::picture::Picture;
 use cao::renderer::{COLOUR, Coding, LateViews, Over, Place, Renderer, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageState, ImageUse, Lent};
 use cao_model::builtin::builtin_box;
+use cao_model::clip::{Clip, Shape};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
@@ -595,6 +596,60 @@ fn views_may_come_after_the_frame_was_submitted() {
     // SAFETY: nothing waits for it.
     unsafe { host.device().destroy_semaphore(semaphore, None) };
     drop((recorded, late, pictures, renderer));
+    drop(gpu);
+    host.destroy();
+}
+
+/// The update in a submission of its own, the drawing in another, as on two queues of a family: ordered by a timeline semaphore alone, each update after
+/// the drawing before it.
+#[test]
+fn updates_and_drawings_are_ordered_by_a_timeline_alone() {
+    let host = Host::new();
+    let gpu = host.adopted(Some(host.queue));
+    let mut renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
+    let (views, look) = (eyes(&volume, 30.0), Look::default());
+    // SAFETY: the device has timeline semaphores.
+    let semaphore = unsafe {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let create = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        host.device().create_semaphore(&create, None).unwrap()
+    };
+    let clip = |frame: usize| {
+        let mut clip = Clip::remove(Shape::Sphere);
+        clip.pose.scale = Vec3::splat(5.0);
+        clip.pose.translate_mm.x = frame as f32 - 2.0;
+        clip
+    };
+    let mut frames = Vec::new();
+    for frame in 0..4 {
+        renderer.set_clips(&[clip(frame)]).unwrap();
+        let picture = Picture::new(&gpu, SIZE, 2).unwrap();
+        let (update, draw) = (host.begin(), host.begin());
+        // SAFETY: both are recording and submitted once below, in this order; each `Recorded` is kept until then.
+        let mut rec = unsafe { gpu.record_into(update) };
+        renderer.record_update(&mut rec).unwrap();
+        let updated = rec.finish().unwrap();
+        // SAFETY: as above.
+        let mut rec = unsafe { gpu.record_into(draw) };
+        renderer.record_picture(&mut rec, &views, &look, &picture).unwrap();
+        let drawn = rec.finish().unwrap();
+        let before = 2 * frame as u64;
+        host.submit_between(update, semaphore, before, before + 1);
+        host.submit_between(draw, semaphore, before + 1, before + 2);
+        frames.push((picture, updated, drawn));
+    }
+    // SAFETY: the queue is the host's.
+    unsafe { host.device().queue_wait_idle(host.queue).unwrap() };
+    for (frame, (picture, ..)) in frames.iter().enumerate() {
+        renderer.set_clips(&[clip(frame)]).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+        let colour = renderer.draw(&views, &look, SIZE).unwrap().0.colour;
+        assert!(texels(&gpu, &picture.colour) == colour.concat(), "frame {frame}");
+    }
+    // SAFETY: nothing waits for it.
+    unsafe { host.device().destroy_semaphore(semaphore, None) };
+    drop((frames, renderer));
     drop(gpu);
     host.destroy();
 }

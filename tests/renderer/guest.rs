@@ -3,11 +3,12 @@
 
 use crate::scenes::{NAMES, Scene, assert_as_fresh, scene};
 use cao::renderer::{COLOUR, Over, Renderer, StereoImage, Target, Targets};
-use cao_gpu::{Access, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse};
+use cao_gpu::{Access, BufferUse, Format, Gpu, ImageDesc, ImageKind, ImageUse, OpenOptions};
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Shape};
 use cao_model::look::Look;
+use cao_model::methods::Method;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
@@ -227,4 +228,90 @@ fn a_lost_device_is_told_from_other_failures() {
     assert!(failure(ash::vk::Result::ERROR_DEVICE_LOST).device_lost());
     assert!(!failure(ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY).device_lost());
     assert!(!cao::Error::from(cao_gpu::Error::Device { problem: "none".into() }).device_lost());
+}
+
+/// A device that has nothing that is optional: 16-bit values as floats, the methods that need no storage of 16 bits, values of 8 bits
+/// interpolated in the kernel, no times, no names. The picture is the same, but for what 16 bits round.
+#[test]
+fn without_anything_optional_the_picture_is_the_same() {
+    let validation = validated();
+    let [all, plain] = [false, true]
+        .map(|plain| Gpu::open(&OpenOptions { validation, plain, ..OpenOptions::default() }).unwrap());
+    let bytes = builtin_box("fruit", [14, 16, 12], [1.0; 3]).unwrap();
+    let (low, high) = bytes.range();
+    let level = |i: usize| (bytes.value(i) - low) / (high - low);
+    let of = |values| Volume::new([14, 16, 12], [1.0; 3], values).unwrap();
+    let volumes = [
+        of(Values::U8((0..bytes.len()).map(|i| (255.0 * level(i)) as u8).collect())),
+        of(Values::U16((0..bytes.len()).map(|i| (65535.0 * level(i)) as u16).collect())),
+    ];
+    for volume in &volumes {
+        let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+        for method in methods() {
+            let setup = Setup::of(method, 1.0);
+            let make = |gpu: &Gpu| Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR);
+            let mut there = make(&all).unwrap();
+            if method == Method::Rays {
+                let refused = make(&plain).map(drop).unwrap_err().to_string();
+                assert!(refused.contains("cao") && refused.contains("lao"), "{refused}");
+                continue;
+            }
+            let mut here = make(&plain).unwrap();
+            let views = eyes(volume, 30.0);
+            let draw = |renderer: &mut Renderer| {
+                renderer.set_clips(&[Clip::remove(Shape::Sphere)]).unwrap();
+                let times = renderer.update(&mut |_| ()).unwrap();
+                (renderer.draw(&views, &Look::default(), [20, 18]).unwrap().0.colour, times.total())
+            };
+            let ((found, none), (expected, some)) = (draw(&mut here), draw(&mut there));
+            assert!(none == 0.0 && some > 0.0, "{none} ms, {some} ms");
+            for (found, expected) in found.iter().flatten().flatten().zip(expected.iter().flatten().flatten())
+            {
+                // Half a level of 255: 16 bits of values and factors, magnified by the transfer function.
+                assert!((found - expected).abs() < 0.002, "{}: {found} for {expected}", method.name());
+            }
+        }
+    }
+    close(all);
+    close(plain);
+}
+
+/// Targets of other sizes, formats and numbers of views, in turn and again: what is allocated afterwards is what was before.
+#[test]
+fn resizes_and_formats_leave_nothing_behind() {
+    let gpu = open();
+    let volume = builtin_box("fruit", [10, 10, 10], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, Setup::new(1.0), Format::Rgba8Srgb).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let views = eyes(&volume, 30.0);
+    let mut reports = Vec::new();
+    for _ in 0..3 {
+        for (n, format) in
+            [Format::Rgba8Srgb, Format::Rgba16Float, Format::Bgra8Unorm].into_iter().enumerate()
+        {
+            for count in [2, 1] {
+                let size = [16 + 8 * n as u32, 30 - 4 * n as u32];
+                let target = |format| {
+                    let (dims, usage) = ([size[0], size[1], 1], ImageUse::ATTACHMENT);
+                    let desc = ImageDesc { dims, layers: count as u32, format, kind: ImageKind::D2, usage };
+                    gpu.image("swapchain", &desc).unwrap()
+                };
+                let (colour, depth) = (target(format), target(Format::D32Float));
+                let targets = Target::layers(&colour, &depth, count);
+                run(&gpu, |rec| {
+                    rec.discard(&colour);
+                    rec.discard(&depth);
+                    rec.barrier(&[], &[Access::AttachmentWrite]);
+                    let targets = Targets::new(&targets, size);
+                    renderer.record_draw(rec, &views[..count], &Look::default(), &targets).unwrap();
+                });
+            }
+        }
+        reports.push(gpu.memory_report());
+    }
+    assert!(reports[0] == reports[1] && reports[1] == reports[2], "{reports:?}");
+    assert!(!reports[0].iter().any(|(name, _)| name == "swapchain"), "{:?}", reports[0]);
+    drop(renderer);
+    close(gpu);
 }

@@ -187,16 +187,28 @@ impl Host {
         }
     }
 
-    /// Submits them, to run when the semaphore has this value.
+    /// Submits it, to run when the semaphore has this value.
     pub fn submit_after(&self, cmd: vk::CommandBuffer, semaphore: vk::Semaphore, value: u64) {
+        self.submit(cmd, semaphore, value, None);
+    }
+
+    /// The same, and sets the semaphore to another value at the end.
+    pub fn submit_between(&self, cmd: vk::CommandBuffer, semaphore: vk::Semaphore, after: u64, then: u64) {
+        self.submit(cmd, semaphore, after, Some(then));
+    }
+
+    fn submit(&self, cmd: vk::CommandBuffer, semaphore: vk::Semaphore, after: u64, then: Option<u64>) {
         // SAFETY: the command buffer is recording and of this device, the semaphore alive.
         unsafe {
             self.device.end_command_buffer(cmd).unwrap();
-            let (waits, values, commands) = ([semaphore], [value], [cmd]);
-            let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().wait_semaphore_values(&values);
+            let (semaphores, after, then, commands) = ([semaphore], [after], then.as_slice(), [cmd]);
+            let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
+                .wait_semaphore_values(&after)
+                .signal_semaphore_values(then);
             let submit = [vk::SubmitInfo::default()
-                .wait_semaphores(&waits)
+                .wait_semaphores(&semaphores)
                 .wait_dst_stage_mask(&[vk::PipelineStageFlags::ALL_COMMANDS])
+                .signal_semaphores(&semaphores[..then.len()])
                 .command_buffers(&commands)
                 .push_next(&mut timeline)];
             self.device.queue_submit(self.queue, &submit, vk::Fence::null()).unwrap();
