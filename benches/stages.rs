@@ -100,8 +100,8 @@ fn stages(criterion: &mut Criterion) {
     let mesh = Arc::new(TriangleMesh::sphere(3));
     for stage in ["peel", "dilate"] {
         bench.stage(stage, stage, |renderer, turn| {
-            // A new scale needs new maps.
-            let pose = Pose { scale: Vec3::splat(to_and_fro(turn)), ..Pose::default() };
+            // Another form needs new layers.
+            let pose = Pose { scale: Vec3::splat(5.0).with_x(to_and_fro(turn)), ..Pose::default() };
             let clip = Clip { pose, ..Clip::remove(Shape::Mesh(mesh.clone())) };
             renderer.set_clips(&[clip]).expect("a mesh clip");
         });

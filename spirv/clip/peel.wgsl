@@ -8,8 +8,8 @@ struct PeelParams {
     // scale of the mesh; 1 / depth range in mm
     scale: vec3<f32>,
     per_depth: f32,
-    // 1 in the first pass, which has none before it
-    first: u32,
+    // number of the pass; the first has none before it
+    surface: u32,
 }
 
 struct Vertices {
@@ -30,10 +30,13 @@ struct Fragment {
     @location(0) face: u32,
 }
 
+#include "shared/peeled.wgsl"
+
 var<immediate> params: PeelParams;
 @group(0) @binding(0) var<storage, read> vertices: Vertices;
 @group(0) @binding(1) var before: texture_depth_2d;
 @group(0) @binding(2) var face_before: texture_2d<u32>;
+@group(0) @binding(3) var<storage, read> peeled: Peeled;
 
 fn on_map(index: u32) -> vec3<f32> {
     let rigid = vertices.corner[index].xyz * params.scale;
@@ -42,6 +45,10 @@ fn on_map(index: u32) -> vec3<f32> {
 
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Vertex {
+    // Behind a pass that drew nothing there is nothing: nowhere to be drawn.
+    if peeled.surfaces < params.surface {
+        return Vertex(vec4(2.0, 2.0, 2.0, 1.0), vec2(0.0), 0u);
+    }
     let map = on_map(index);
     let triangle = index / 3u;
     let depths = vec3(on_map(3u * triangle).z, on_map(3u * triangle + 1u).z, on_map(3u * triangle + 2u).z);
@@ -55,7 +62,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Vertex {
 fn fragment(in: Vertex, @builtin(front_facing) front: bool) -> Fragment {
     let depth = clamp(in.position.z, in.range.x, in.range.y);
     let face = 2u * in.triangle + u32(front);
-    if params.first == 0u {
+    if params.surface != 0u {
         let pixel = vec2<i32>(in.position.xy);
         let last = textureLoad(before, pixel, 0);
         if depth < last || (depth == last && face <= textureLoad(face_before, pixel, 0).r) {

@@ -16,8 +16,8 @@ const BLOCK = 16u;
 const BLOCK_BOUNDS = 4u;
 
 struct Layers {
-    // for each pair: front map, back map; rows of y, x fastest; depth 0 ... 1 of the clip camera; EMPTY fronts. Behind them, for
-    // each pair, over blocks of pixels: maps of BLOCK_BOUNDS
+    // of each mesh, for each pair: front map, back map; rows of y, x fastest; depth 0 ... 1 of the clip camera; EMPTY fronts. Behind
+    // them, for each pair, over blocks of pixels: maps of BLOCK_BOUNDS
     depth: array<f32>,
 }
 

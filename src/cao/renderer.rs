@@ -24,7 +24,7 @@ use crate::host::read_values;
 use crate::method;
 use crate::subject::Subject;
 use crate::{Error, Result};
-use cao_gpu::{Access, Buffer, Format, Gpu, Image, Timings};
+use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_model::clip::Clip;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
@@ -73,8 +73,6 @@ pub struct Renderer {
     unshown: Changed,
     building: Building,
     pace: Pace,
-    /// Times of preparing clip meshes since the last update.
-    prepared: Timings,
 }
 
 impl Renderer {
@@ -106,7 +104,6 @@ impl Renderer {
             unshown: Changed::ALL,
             building: Building::new(gpu)?,
             pace: Pace::default(),
-            prepared: Timings::new(),
         })
     }
 
@@ -124,8 +121,8 @@ impl Renderer {
         (self.changed, self.unshown) = (self.changed.and(changed), self.unshown.and(changed));
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when clip meshes need new maps for it, and when the method is
-    /// another: then nothing is occluded until the next update has ended. While an update spans frames other settings of the same method wait
+    /// Changes how occlusion is computed. Uses the device's queue when the method is another: then nothing is occluded until the next
+    /// update has ended. While an update spans frames other settings of the same method wait
     /// for its end. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
         setup.check(f64::from(self.subject.field.min_spacing()))?;
@@ -137,13 +134,19 @@ impl Renderer {
             self.subject.setup = setup;
         }
         self.subject.wanted = setup;
-        let held =
-            self.prepare_clips().and_then(|()| if waits { Ok(()) } else { self.hold(before.0.method) });
-        if let Err(error) = held {
-            // Maps of one radius under rays of another would leave voxels stale.
-            (self.subject.setup, self.subject.wanted) = before;
-            self.restore_clips()?;
-            return Err(error);
+        let planned = self.subject.planned_clips(method::map_radius(&self.subject));
+        let held = planned.and_then(|planned| {
+            if !waits {
+                self.hold(before.0.method)?;
+            }
+            Ok(planned)
+        });
+        match held {
+            Ok(planned) => self.subject.clip_set = planned,
+            Err(error) => {
+                (self.subject.setup, self.subject.wanted) = before;
+                return Err(error);
+            }
         }
         self.edited(Changed { anew: true, ..Changed::NOTHING });
         self.pace.clear();
@@ -157,7 +160,7 @@ impl Renderer {
             return self.ambient.set(&self.subject);
         }
         self.ambient = method::of(&self.subject)?;
-        self.invalidate();
+        self.spoil();
         Ok(())
     }
 
@@ -175,31 +178,22 @@ impl Renderer {
         written
     }
 
-    /// Changes the clips: shapes, sides, poses. Uses the device's queue only where a mesh is new or its axes have a new ratio, and
-    /// with methods `lao` and `cao` where it has a new scale; moving and turning never do. On error the clips stay as they were.
+    /// Changes the clips: shapes, sides, poses. Never uses a queue: maps of a mesh that is new, has other vertices or a new ratio of its axes
+    /// are made by the next update, and with methods `lao` and `cao` those of another scale. On error the clips stay as they were.
+    ///
+    /// How many layer pairs a mesh needs is known when that update has run. Too few are refused by `update`, and by the first
+    /// `record_update…` that is called after the recorded commands have run and their [`Recorded`](cao_gpu::Recorded) is dropped; until then what
+    /// lies behind the last pair is not cut.
     pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
         let before = std::mem::replace(&mut self.subject.clips, clips.to_vec());
-        if let Err(error) = self.prepare_clips() {
-            self.subject.clips = before;
-            self.restore_clips()?;
-            return Err(error);
+        match self.subject.planned_clips(method::map_radius(&self.subject)) {
+            Ok(planned) => self.subject.clip_set = planned,
+            Err(error) => {
+                self.subject.clips = before;
+                return Err(error);
+            }
         }
         self.edited(Changed { clips: true, ..Changed::NOTHING });
-        Ok(())
-    }
-
-    /// Maps of clip meshes again, after others failed. Where these fail too, nothing counts as done.
-    fn restore_clips(&mut self) -> Result<()> {
-        if let Err(error) = self.prepare_clips() {
-            self.invalidate();
-            return Err(error);
-        }
-        Ok(())
-    }
-
-    fn prepare_clips(&mut self) -> Result<()> {
-        let radius = method::map_radius(&self.subject);
-        self.prepared.extend(self.subject.prepare_clips(radius)?);
         Ok(())
     }
 

@@ -76,16 +76,19 @@ impl Subject {
         0.5 * Vec3::new(edge(0), edge(1), edge(2)).length()
     }
 
-    /// Makes the maps of clip meshes that are not there yet, dilated by `radius_mm` where it is a number. Uses the device's queue only then.
-    pub(crate) fn prepare_clips(&mut self, radius_mm: Option<f32>) -> Result<Timings> {
-        let half_mm = self.half_diagonal();
-        let Self { gpu, peel, dilate, clips, clip_set, wanted, .. } = self;
-        clip_set.prepare(gpu, peel, dilate, clips, radius_mm, half_mm, wanted.maps)
+    /// The set for the clips and the settings that are wanted, its maps dilated by `radius_mm` where it is a number.
+    pub(crate) fn planned_clips(&self, radius_mm: Option<f32>) -> Result<ClipSet> {
+        self.clip_set.planned(&self.gpu, &self.clips, radius_mm, self.half_diagonal(), self.wanted.maps)
     }
 
-    /// Whether every clip mesh has its maps: not after making them failed.
-    pub(crate) fn clips_are_prepared(&self) -> bool {
-        self.clip_set.fits(&self.clips)
+    /// Records what makes the maps of clip meshes that are not there.
+    pub(crate) fn record_clip_maps(&mut self, rec: &mut Recorder) -> Result<()> {
+        self.clip_set.record_maps(&self.gpu, rec, &self.peel, &self.dilate)
+    }
+
+    /// Makes them. Uses the device's queue only where there is one to make.
+    pub(crate) fn make_clip_maps(&mut self) -> Result<Timings> {
+        self.clip_set.make(&self.gpu, &self.peel, &self.dilate)
     }
 
     /// The transfer function's table, and the bricks that it gives opacity.

@@ -286,7 +286,7 @@ pub unsafe extern "C" fn cao_renderer_set_transfer(
     })
 }
 
-/// Changes how occlusion is computed. Uses the lent queue where the method is another or clips are meshes. NULL is the default.
+/// Changes how occlusion is computed. Uses the lent queue where the method is another. NULL is the default.
 // SAFETY: the name is ours alone; pointers are as the header asks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cao_renderer_set_setup(
@@ -304,7 +304,7 @@ pub unsafe extern "C" fn cao_renderer_set_setup(
     })
 }
 
-/// Changes the clips, all of them, at most 8; 0 and NULL for none. Uses the lent queue only where a mesh is new or has a new scale.
+/// Changes the clips, all of them, at most 8; 0 and NULL for none. Never uses a queue: maps of meshes are made by the next update.
 // SAFETY: the name is ours alone; pointers are as the header asks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cao_renderer_set_clips(

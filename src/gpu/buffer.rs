@@ -112,6 +112,17 @@ impl Buffer {
         self.0.bytes
     }
 
+    /// Whether both are handles of one.
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// Whether another handle of it is there: of the program, or of commands that are recorded and, as far as is known, have not run. What a
+    /// host records counts until it drops its [`Recorded`](super::Recorded).
+    pub fn is_shared(&self) -> bool {
+        Arc::strong_count(&self.0) > 1
+    }
+
     /// Copies `data` to `offset` (bytes) of a mapped buffer. The device must not be using those bytes.
     ///
     /// # Errors

@@ -54,7 +54,7 @@ pub struct Adopted {
     pub queue_family: u32,
     /// Do without graphics even where the family has them.
     pub compute_only: bool,
-    /// A queue of that family lent to the calls that say they use one (uploads, read-backs, new clip meshes): during such a call
+    /// A queue of that family lent to the calls that say they use one (uploads, read-backs): during such a call
     /// nobody else may use it. `None`: those calls refuse, and recording into the host's command buffers is all there is.
     pub queue: Option<vk::Queue>,
 }

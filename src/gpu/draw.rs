@@ -1,9 +1,10 @@
 //! Drawing into images.
 
 use super::{
-    Format, Image, ImageKind, ImageUse, Pipeline, Recorder,
+    Format, Gpu, Image, ImageKind, ImageUse, Pipeline, Recorder,
     access::Access,
     bind::Bindings,
+    device::Inner,
     hazard::Touch,
     pipeline::Targets,
     transfer::{clear_colour, clear_depth},
@@ -30,6 +31,30 @@ pub struct Attachments<'a> {
 pub(crate) const COLOURS: [&str; 4] =
     ["colour attachment 0", "colour attachment 1", "colour attachment 2", "colour attachment 3"];
 
+impl Gpu {
+    /// Refuses where nothing can be drawn, in the name of what would be.
+    ///
+    /// # Errors
+    /// [`Error::Config`] on a queue family that does no graphics.
+    pub fn check_graphics(&self, what: &str) -> Result<()> {
+        check_graphics(&self.0, what)
+    }
+}
+
+fn check_graphics(gpu: &Inner, what: &str) -> Result<()> {
+    if gpu.graphics {
+        return Ok(());
+    }
+    Err(Error::Config {
+        what: what.into(),
+        problem: format!(
+            "draws, which queue family {} does not do here; adopt a device with a queue of graphics, or do without clip meshes \
+             and present pictures yourself (record_picture)",
+            gpu.queue_family
+        ),
+    })
+}
+
 impl Recorder {
     /// Draws `vertices / 3` triangles; the vertex shader makes its vertices from their index.
     ///
@@ -43,16 +68,7 @@ impl Recorder {
         attachments: Attachments<'_>,
         vertices: u32,
     ) -> Result<()> {
-        if !self.gpu.graphics {
-            return Err(Error::Config {
-                what: pipeline.0.name.clone(),
-                problem: format!(
-                    "draws, which queue family {} does not do here; adopt a device with a queue of graphics, or do without clip meshes \
-                     and present pictures yourself (record_picture)",
-                    self.gpu.queue_family
-                ),
-            });
-        }
+        check_graphics(&self.gpu, &pipeline.0.name)?;
         let binds = binds.list();
         let mut resolved = self.prepare(pipeline, vk::PipelineBindPoint::GRAPHICS, &binds, push)?;
         let Some(targets) = &pipeline.0.targets else { return Ok(()) };

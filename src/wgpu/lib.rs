@@ -127,7 +127,7 @@ fn unite(into: &mut vk::PhysicalDeviceFeatures, from: &vk::PhysicalDeviceFeature
     into.iter_mut().zip(from).for_each(|(into, from)| *into |= from);
 }
 
-/// Takes a wgpu device for cao, and lends it its queue for the calls that say they use one (loading, reading back, new clip meshes).
+/// Takes a wgpu device for cao, and lends it its queue for the calls that say they use one (loading, reading back).
 ///
 /// # Safety
 /// The device must have what [`request_device`] gives it, and be alive until the [`Gpu`] and all that was made with it are dropped: keep

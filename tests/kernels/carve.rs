@@ -80,7 +80,8 @@ impl<'a> Bench<'a> {
         samples: AntiAliasing,
     ) {
         let Kernels { classify, clip_bricks, carve, opacity, occupancy, peel, dilate } = kernels;
-        self.set.prepare(self.gpu, peel, dilate, clips, Some(1.0), self.half_mm, MAPS).unwrap();
+        self.set = self.set.planned(self.gpu, clips, Some(1.0), self.half_mm, MAPS).unwrap();
+        self.set.make(self.gpu, peel, dilate).unwrap();
         let between = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
         run(self.gpu, |rec| {
             let count = &classify.count;

@@ -45,8 +45,9 @@ impl<'a> Kernels<'a> {
         let reach = Classify::reach(&field, occlusion);
         let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
         let half_mm = 0.5 * size_mm(grid).length();
-        let mut set = ClipSet::new(gpu).unwrap();
-        set.prepare(gpu, &self.peel, &self.dilate, clips, Some(radius), half_mm, maps).unwrap();
+        let none = ClipSet::new(gpu).unwrap();
+        let mut set = none.planned(gpu, clips, Some(radius), half_mm, maps).unwrap();
+        set.make(gpu, &self.peel, &self.dilate).unwrap();
         run(gpu, |rec| set.record(rec, clips, half_mm).unwrap());
         Clipped { field, set, reach }
     }

@@ -3,7 +3,7 @@
 
 use cao::clip::clips::MeshClip;
 use cao::clip::dilate::Dilate;
-use cao_gpu::{BufferUse, Gpu};
+use cao_gpu::{Access, BufferUse, Gpu};
 use cao_measure::random::Random;
 use cao_model::clip::{ClipCamera, Mode};
 use cao_testing::*;
@@ -63,7 +63,13 @@ fn on_device(gpu: &Gpu, kernel: &Dilate, clip: &MeshClip, radius: f32, layers: &
     let blocks = Dilate::blocks(gpu, cells, clip.pairs).unwrap();
     let count = clip.dilation_at + 2 * clip.pairs * cells * cells;
     let maps = gpu.buffer("maps", 4 * u64::from(count), BufferUse::Device).unwrap();
-    run(gpu, |rec| kernel.record(rec, clip, radius, &layers, &blocks, &maps).unwrap());
+    let groups = gpu.buffer("groups", 12, BufferUse::Device).unwrap();
+    run(gpu, |rec| {
+        let over = cells.div_ceil(8);
+        rec.update(&groups, 0, bytemuck::cast_slice(&[over, over, clip.pairs])).unwrap();
+        rec.barrier(&[Access::TransferWrite], &[Access::IndirectRead]);
+        kernel.record(rec, clip, radius, &layers, &blocks, &maps, &groups).unwrap();
+    });
     let all: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &maps));
     all[clip.dilation_at as usize..].to_vec()
 }

@@ -14,6 +14,7 @@ mod lao;
 mod near;
 mod occupancy;
 mod opacity;
+mod pairs;
 mod peel;
 mod present;
 mod raycast;

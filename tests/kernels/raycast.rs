@@ -474,7 +474,8 @@ impl Stages {
         let bounds = Bounds::new(gpu).unwrap();
         let mut stages = stages;
         let (peel, dilate) = (Peel::new(gpu).unwrap(), Dilate::new(gpu).unwrap());
-        stages.clips.prepare(gpu, &peel, &dilate, clips, Some(2.0), 50.0, MAPS).unwrap();
+        stages.clips = stages.clips.planned(gpu, clips, Some(2.0), 50.0, MAPS).unwrap();
+        stages.clips.make(gpu, &peel, &dilate).unwrap();
         let volumes = &stages.volumes;
         run(gpu, |rec| {
             stages.transfer.record(rec, transfer).unwrap();

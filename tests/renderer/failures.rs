@@ -87,8 +87,8 @@ fn what_is_refused_changes_nothing() {
         let mut far = scene.setup;
         (far.occlusion.radius_mm, far.maps.resolution) = (1e6 * size.max_element(), 64);
         // Maps of another radius come before what is refused.
-        let mut too_few = scene.setup;
-        (too_few.occlusion.radius_mm, too_few.maps.pairs) = (0.5 * scene.setup.occlusion.radius_mm, 1);
+        let mut none = scene.setup;
+        (none.occlusion.radius_mm, none.maps.pairs) = (0.5 * scene.setup.occlusion.radius_mm, 0);
         let nothing = TransferFunction { opacity: Vec::new(), ..scene.transfer.clone() };
         type Edit<'a> = (&'a str, Box<dyn Fn(&mut Renderer) -> cao::Result<()> + 'a>);
         let refused: [Edit; 6] = [
@@ -97,7 +97,7 @@ fn what_is_refused_changes_nothing() {
                 Box::new(|r| r.set_clips(&[larger.clone(), open_mesh.clone()])),
             ),
             ("a radius that no ray has", Box::new(|r| r.set_setup(far))),
-            ("fewer layers than the mesh has", Box::new(|r| r.set_setup(too_few))),
+            ("no layers", Box::new(|r| r.set_setup(none))),
             ("values of another type", Box::new(|r| r.set_values([0; 3], &other_type))),
             ("values outside", Box::new(|r| r.set_values([u32::MAX, 0, 0], &inside))),
             ("an empty transfer function", Box::new(|r| r.set_transfer(nothing.clone()))),

@@ -6,6 +6,7 @@ mod budget;
 mod calls;
 mod consistency;
 mod contextual;
+mod deform;
 mod edits;
 mod embed;
 mod exactness;

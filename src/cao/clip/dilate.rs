@@ -30,7 +30,9 @@ impl Dilate {
         gpu.buffer("dilation blocks", 8 * u64::from(cells * cells) * u64::from(pairs), BufferUse::Device)
     }
 
-    /// Fills the dilation maps of one mesh clip for this radius in mm.
+    /// Fills the dilation maps of one mesh clip for this radius in mm, of as many pairs as `groups` says, which begins with the group counts
+    /// over cells and pairs ([`Peeled`](cao_kernels::shared::peeled::Peeled)).
+    #[expect(clippy::too_many_arguments, reason = "a mesh and four buffers, each named once")]
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -39,6 +41,7 @@ impl Dilate {
         layers: &Buffer,
         blocks: &Buffer,
         dilation: &Buffer,
+        groups: &Buffer,
     ) -> Result<()> {
         let camera = clip.camera;
         let params = kernel::DilateParams {
@@ -52,12 +55,11 @@ impl Dilate {
             flags: if clip.keep { kernel::KEEP } else { 0 } | if clip.literal { kernel::LITERAL } else { 0 },
             per_cell: clip.cells.pixel_mm / camera.pixel_mm,
         };
-        let over = [clip.cells.resolution, clip.cells.resolution, clip.pairs];
         let push = bytemuck::bytes_of(&params);
         let binds = kernel::ReduceBindings { layers, blocks };
-        rec.dispatch_over(&self.reduce, &binds, push, over)?;
+        rec.dispatch_indirect(&self.reduce, &binds, push, groups, 0)?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         let binds = kernel::MainBindings { blocks, dilation };
-        rec.dispatch_over(&self.main, &binds, push, over)
+        rec.dispatch_indirect(&self.main, &binds, push, groups, 0)
     }
 }

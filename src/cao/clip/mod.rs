@@ -5,5 +5,6 @@ pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod dilate;
+pub mod pairs;
 pub mod peel;
 mod positions;

@@ -1,21 +1,22 @@
 //! Depth layers of a clip mesh (CAO §3.4 step 2, Everitt 2001): depth-only passes from the orthographic clip camera, 32-bit depth,
-//! each of which finds the next surface behind every pixel, until there is none.
+//! each of which finds the next surface behind every pixel. What they find becomes layer pairs on the device (`pairs`).
 //!
-//! Along the ray of a pixel each face adds 1 to the winding number or takes 1 away, as it faces the clip camera or not.
-//! A layer pair begins where the number leaves 0 and ends where it is 0 again, so that the pairs are the solid itself: parts that
-//! touch or overlap are one, and it does not matter which way the whole mesh faces.
+//! How many passes a mesh needs is known when they have run. So a number of them is recorded, those behind a pass that drew nothing
+//! draw no fragment, and what was found is read when the device got there ([`verdict`]).
 //!
 //! In: a mesh without border. Out: depth maps of `resolution²` f32, rows of y, front and back of each pair in turn.
-//! Cost: a rasterization of the mesh for each surface behind one another and one more, once for each mesh, scale and margin.
+//! Cost: a rasterization of the mesh for each surface behind one another and one more, once for each mesh, shape and margin.
 
 use crate::Result;
+use crate::clip::pairs::{Pairs, Place};
 use crate::stages;
 use cao_gpu::{
-    Access, Attachments, BufferUse, Cull, DepthTest, Flat, Format, Gpu, GraphicsDesc, Image, ImageDesc,
-    ImageKind, ImageUse, Pipeline,
+    Access, Attachments, Buffer, BufferUse, Cull, DepthTest, Flat, Format, Gpu, GraphicsDesc, Image,
+    ImageDesc, ImageKind, ImageUse, Pipeline, Recorder,
 };
 use cao_kernels::peel as kernel;
-use cao_kernels::shared::layers::{EMPTY, ONE_DEPTH};
+use cao_kernels::shared::layers::EMPTY;
+use cao_kernels::shared::peeled::Peeled;
 use cao_model::clip::{Clip, ClipCamera};
 use cao_model::mesh::TriangleMesh;
 use cao_model::settings::MapSettings;
@@ -39,19 +40,140 @@ pub struct Layers {
     pub milliseconds: f64,
 }
 
-/// The kernel `peel`.
+/// The kernel `peel`, and the one that makes pairs of what it draws.
 pub struct Peel {
     pipeline: Pipeline,
+    pairs: Pairs,
 }
 
-/// What a pass draws: depths, and which face of the mesh each is.
-struct Surface {
-    depth: Image,
-    face: Image,
+/// What a pass draws: depths, and which face of the mesh each is, twice its number and 1 if it faces the clip camera.
+pub struct Surface {
+    /// Empty pixels [`EMPTY`].
+    pub depth: Image,
+    /// As `R32Uint`.
+    pub face: Image,
+}
+
+/// Working memory: the last two surfaces, and the pairs of each pixel so far.
+pub struct Work {
+    surfaces: [Surface; 2],
+    pixels: Buffer,
+}
+
+impl Work {
+    /// For maps with so many pixels along an edge.
+    pub fn new(gpu: &Gpu, edge: u32) -> cao_gpu::Result<Self> {
+        let surfaces = [Surface::new(gpu, edge)?, Surface::new(gpu, edge)?];
+        Ok(Self { surfaces, pixels: Pairs::pixels(gpu, edge)? })
+    }
+}
+
+/// The corners of a mesh's triangles: written by the host, and on the device.
+#[derive(Clone)]
+pub struct Corners {
+    written: Buffer,
+    there: Buffer,
+    count: u32,
+}
+
+impl Corners {
+    /// Memory with the corners of this mesh.
+    pub fn new(gpu: &Gpu, mesh: &TriangleMesh) -> cao_gpu::Result<Self> {
+        let corners: Vec<[f32; 4]> = mesh
+            .triangles
+            .iter()
+            .flatten()
+            .map(|&i| mesh.vertices[i as usize].extend(1.0).to_array())
+            .collect();
+        let bytes: &[u8] = bytemuck::cast_slice(&corners);
+        let written = gpu.buffer("clip mesh as written", bytes.len() as u64, BufferUse::Upload)?;
+        written.write(0, bytes)?;
+        let there = gpu.buffer("clip mesh", bytes.len() as u64, BufferUse::Device)?;
+        Ok(Self { written, there, count: corners.len() as u32 })
+    }
+}
+
+/// A mesh to be peeled.
+#[derive(Clone, Copy)]
+pub struct Peeling<'a> {
+    /// Its corners.
+    pub corners: &'a Corners,
+    /// What they are scaled by.
+    pub scale: Vec3,
+    /// From where.
+    pub camera: ClipCamera,
+    /// How many surfaces are looked for.
+    pub passes: u32,
+    /// Cells along an edge of its dilation maps.
+    pub cells: u32,
+    /// What is found, [`Peeled`].
+    pub peeled: &'a Buffer,
+}
+
+/// Whether the passes were enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// They found all surfaces.
+    Complete,
+    /// The last one found some, too: so many may do.
+    More(u32),
+}
+
+/// Passes over a mesh of which nothing is known: one for each surface of one pair more than are kept, so that one too many is seen, and one
+/// that finds nothing.
+pub fn first_passes(pairs: u32) -> u32 {
+    2 * pairs + 3
+}
+
+/// What the passes over a mesh found, of which at most `max_pairs` layer pairs are kept.
+///
+/// Errors: more than `max_pairs` pairs at some pixel, more than [`MAX_SURFACES`] surfaces, or a border; each says at how many pixels.
+pub fn verdict(
+    found: &Peeled,
+    mesh: &TriangleMesh,
+    edge: u32,
+    max_pairs: u32,
+    passes: u32,
+) -> Result<Verdict> {
+    let pixels = edge * edge;
+    let Peeled { surfaces, seen, most, beyond, open, from_first, .. } = *found;
+    let problem = if surfaces >= passes && passes <= MAX_SURFACES && most <= max_pairs {
+        return Ok(Verdict::More((2 * passes).min(MAX_SURFACES + 1)));
+    } else if surfaces >= passes && most <= max_pairs {
+        format!(
+            "more than {MAX_SURFACES} surfaces lie behind one another at {seen} of {pixels} pixels of the clip camera; \
+             join its parts into fewer in a mesh editor"
+        )
+    } else if surfaces < passes && open > 0 {
+        let first = pixels - from_first.min(pixels);
+        format!(
+            "front and back faces differ in number at {open} of {pixels} pixels of the clip camera, first at ({}, {}): the \
+             mesh is open or wrongly wound there; close it",
+            first % edge,
+            first / edge
+        )
+    } else if most > max_pairs {
+        // Turning the clip is no remedy: its camera turns with it. Turning the vertices within their file is one.
+        let more = match max_pairs < MAX_PAIRS {
+            true => format!(", or allow up to {MAX_PAIRS} pairs"),
+            false => String::new(),
+        };
+        // A pair that has ended stays one, whatever lies behind it.
+        let least = if surfaces < passes { "" } else { "at least " };
+        format!(
+            "more than {max_pairs} layer pairs at {beyond} of {pixels} pixels of the clip camera: {least}{most} found; split the mesh into \
+             several clips (up to {}), or turn the mesh's vertices in its file{more}",
+            Clip::MAX
+        )
+    } else {
+        return Ok(Verdict::Complete);
+    };
+    Err(cao_model::Error::Mesh { name: mesh.name.clone(), problem }.into())
 }
 
 impl Surface {
-    fn new(gpu: &Gpu, edge: u32) -> cao_gpu::Result<Self> {
+    /// Images of so many pixels along an edge.
+    pub fn new(gpu: &Gpu, edge: u32) -> cao_gpu::Result<Self> {
         let image = |name, format| {
             let usage = ImageUse::SAMPLED | ImageUse::ATTACHMENT;
             gpu.image(
@@ -82,61 +204,43 @@ impl Peel {
                 ..GraphicsDesc::default()
             },
         )?;
-        Ok(Self { pipeline })
+        Ok(Self { pipeline, pairs: Pairs::new(gpu)? })
     }
 
-    /// Draws the layers of a mesh without border, scaled by `scale`. Uses the device's queue and waits for it.
-    ///
-    /// Errors: more than `max_pairs` pairs at some pixel, more than [`MAX_SURFACES`] surfaces, or a border; each says at how many pixels.
-    pub fn run(
-        &self,
-        gpu: &Gpu,
-        mesh: &TriangleMesh,
-        scale: Vec3,
-        camera: ClipCamera,
-        max_pairs: u32,
-    ) -> Result<Layers> {
-        let corners: Vec<[f32; 4]> = mesh
-            .triangles
-            .iter()
-            .flatten()
-            .map(|&i| mesh.vertices[i as usize].extend(1.0).to_array())
-            .collect();
-        let bytes: &[u8] = bytemuck::cast_slice(&corners);
-        let vertices = gpu.buffer("clip mesh", bytes.len() as u64, BufferUse::Upload)?;
-        vertices.write(0, bytes)?;
-
+    /// Records the passes over a mesh, and what makes layer pairs of them. Recordings before have to have left the buffers alone; the
+    /// barriers in between are its own, and what it wrote is storage.
+    pub fn record(&self, rec: &mut Recorder, mesh: &Peeling, to: &Place, work: &Work) -> cao_gpu::Result<()> {
+        let Peeling { corners, scale, camera, passes, peeled, .. } = *mesh;
         let edge = camera.resolution;
-        let map_bytes = u64::from(edge) * u64::from(edge) * 4;
-        // Depths, then faces.
-        let read_back = gpu.buffer("layer read-back", 2 * map_bytes, BufferUse::Readback)?;
-        let mut milliseconds = 0.0;
-        let mut pairs = Pairs::new((edge * edge) as usize, max_pairs as usize);
-        let (mut before, mut now) = (Surface::new(gpu, edge)?, Surface::new(gpu, edge)?);
-        for surface in 0.. {
+        for Surface { depth, face } in &work.surfaces {
+            rec.discard(depth);
+            rec.discard(face);
+        }
+        rec.copy_buffer(&corners.written, 0, &corners.there, 0, corners.there.bytes())?;
+        rec.barrier(&[Access::TransferWrite], &[Access::GraphicsRead]);
+        Pairs::record_begin(rec, peeled, mesh.cells)?;
+        for surface in 0..passes {
+            let (now, before) = (surface as usize % 2, (surface as usize + 1) % 2);
+            let (now, before) = (&work.surfaces[now], &work.surfaces[before]);
             let params = kernel::PeelParams {
                 corner: camera.corner.to_array(),
                 per_half: 2.0 / (camera.pixel_mm * edge as f32),
                 scale: scale.to_array(),
                 per_depth: 1.0 / camera.depth_mm,
-                first: u32::from(surface == 0),
+                surface,
                 pad: Default::default(),
             };
-            let mut rec = gpu.recorder("peel")?;
-            if surface == 0 {
-                rec.discard(&before.depth);
-                rec.discard(&before.face);
-            }
-            rec.discard(&now.depth);
-            rec.discard(&now.face);
-            rec.barrier(&[], &[Access::AttachmentWrite, Access::GraphicsRead]);
-            rec.stage(stages::PEEL)?;
+            rec.barrier(
+                &[Access::SampledRead, Access::StorageWrite, Access::GraphicsRead, Access::AttachmentWrite],
+                &[Access::GraphicsRead, Access::AttachmentWrite],
+            );
             rec.draw(
                 &self.pipeline,
                 &kernel::DrawBindings {
-                    vertices: &vertices,
+                    vertices: &corners.there,
                     before: Flat::Only(&before.depth),
                     face_before: Flat::Only(&before.face),
+                    peeled,
                 },
                 bytemuck::bytes_of(&params),
                 Attachments {
@@ -146,133 +250,59 @@ impl Peel {
                     at: [0; 2],
                     size: [edge, edge],
                 },
-                corners.len() as u32,
+                corners.count,
             )?;
+            rec.barrier(
+                &[Access::AttachmentWrite, Access::GraphicsRead, Access::StorageRead, Access::StorageWrite],
+                &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
+            );
+            let number = (surface, surface + 1 == passes);
+            self.pairs.record_add(rec, to, now, number, &work.pixels, peeled)?;
+        }
+        self.pairs.record_finish(rec, to, &work.pixels, peeled)
+    }
+
+    /// Draws the layers of a mesh without border, scaled by `scale`. Uses the device's queue and waits for it.
+    ///
+    /// Errors: those of [`verdict`].
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        mesh: &TriangleMesh,
+        scale: Vec3,
+        camera: ClipCamera,
+        max_pairs: u32,
+    ) -> Result<Layers> {
+        let edge = camera.resolution;
+        let layers_len = Pairs::layers_len(edge, max_pairs);
+        let bytes = 4 * u64::from(layers_len + Pairs::bounds_len(edge, max_pairs));
+        let layers = gpu.buffer("clip layers", bytes, BufferUse::Device)?;
+        let (corners, work, peeled) = (Corners::new(gpu, mesh)?, Work::new(gpu, edge)?, Pairs::peeled(gpu)?);
+        let to = Place {
+            resolution: edge,
+            pairs: max_pairs,
+            layers: &layers,
+            layers_at: 0,
+            blocks_at: layers_len,
+        };
+        let mut passes = first_passes(max_pairs);
+        let mut milliseconds = 0.0;
+        let found = loop {
+            let mut rec = gpu.recorder("peel")?;
+            rec.stage(stages::PEEL)?;
+            let mesh_to_peel =
+                Peeling { corners: &corners, scale, camera, passes, cells: 1, peeled: &peeled };
+            self.record(&mut rec, &mesh_to_peel, &to, &work)?;
             rec.end_stage()?;
-            rec.barrier(&[Access::AttachmentWrite], &[Access::TransferRead]);
-            rec.copy_image_to_buffer(&now.depth, 0, [0; 3], [edge, edge, 1], &read_back, 0)?;
-            rec.copy_image_to_buffer(&now.face, 0, [0; 3], [edge, edge, 1], &read_back, map_bytes)?;
-            rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
             milliseconds += rec.submit_and_wait()?.total();
-            let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&read_back.read(0, map_bytes)?);
-            let face: Vec<u32> = bytemuck::pod_collect_to_vec(&read_back.read(map_bytes, map_bytes)?);
-            let seen = depth.iter().filter(|&&z| z < EMPTY).count();
-            if seen == 0 {
-                break;
+            let found: Peeled = bytemuck::pod_read_unaligned(&crate::host::read_buffer(gpu, &peeled)?);
+            match verdict(&found, mesh, edge, max_pairs, passes)? {
+                Verdict::Complete => break found,
+                Verdict::More(more) => passes = more,
             }
-            if surface >= MAX_SURFACES {
-                return Err(refuse(
-                    mesh,
-                    format!(
-                        "more than {MAX_SURFACES} surfaces lie behind one another at {seen} of {} pixels of the clip camera; \
-                         join its parts into fewer in a mesh editor",
-                        depth.len()
-                    ),
-                ));
-            }
-            pairs.add(&depth, &face);
-            std::mem::swap(&mut before, &mut now);
-        }
-        let pairs = pairs.finish(mesh, edge)?;
-        let count = (pairs.len() / 2) as u32;
-        Ok(Layers { camera, pairs: count, depth: pairs.concat(), milliseconds })
-    }
-}
-
-fn refuse(mesh: &TriangleMesh, problem: String) -> crate::Error {
-    cao_model::Error::Mesh { name: mesh.name.clone(), problem }.into()
-}
-
-/// The layer pairs of each pixel, from its surfaces in the order of depth.
-struct Pairs {
-    /// At most that many pairs are kept.
-    max: usize,
-    /// Winding number behind the last surface.
-    winding: Vec<i32>,
-    /// Pairs so far, the one that has not ended yet too.
-    count: Vec<usize>,
-    /// Where the last pair began and ended.
-    last: Vec<[f32; 2]>,
-    /// Front and back map of each pair that is kept.
-    maps: Vec<Vec<f32>>,
-}
-
-impl Pairs {
-    fn new(pixels: usize, max: usize) -> Self {
-        Self {
-            max,
-            winding: vec![0; pixels],
-            count: vec![0; pixels],
-            last: vec![[EMPTY; 2]; pixels],
-            // A solid so small or thin that it falls between all pixels hides nothing: one pair of empty layers.
-            maps: vec![vec![EMPTY; pixels]; 2],
-        }
-    }
-
-    fn add(&mut self, depth: &[f32], face: &[u32]) {
-        for (pixel, (&z, &face)) in depth.iter().zip(face).enumerate() {
-            if z >= EMPTY {
-                continue;
-            }
-            let before = self.winding[pixel];
-            self.winding[pixel] += if face & 1 == 1 { 1 } else { -1 };
-            let (count, last) = (&mut self.count[pixel], &mut self.last[pixel]);
-            if before == 0 {
-                // A gap of nothing is none: the last pair goes on.
-                if *count == 0 || z - last[1] > ONE_DEPTH {
-                    *count += 1;
-                    *last = [z, z];
-                }
-            } else if self.winding[pixel] == 0 {
-                last[1] = z;
-                if z - last[0] <= ONE_DEPTH {
-                    // Nor is a pair of nothing one.
-                    *count -= 1;
-                    last[1] = f32::NEG_INFINITY;
-                } else if *count <= self.max {
-                    while self.maps.len() < 2 * *count {
-                        self.maps.push(vec![EMPTY; depth.len()]);
-                    }
-                    self.maps[2 * *count - 2][pixel] = last[0];
-                    self.maps[2 * *count - 1][pixel] = z;
-                }
-            }
-        }
-    }
-
-    /// The maps, or what is wrong and where.
-    fn finish(self, mesh: &TriangleMesh, edge: u32) -> Result<Vec<Vec<f32>>> {
-        let pixels = self.count.len();
-        if let Some(first) = self.winding.iter().position(|&w| w != 0) {
-            let count = self.winding.iter().filter(|&&w| w != 0).count();
-            return Err(refuse(
-                mesh,
-                format!(
-                    "front and back faces differ in number at {count} of {pixels} pixels of the clip camera, first at ({}, {}): the \
-                     mesh is open or wrongly wound there; close it",
-                    first as u32 % edge,
-                    first as u32 / edge
-                ),
-            ));
-        }
-        let most = self.count.iter().copied().max().unwrap_or(0);
-        if most > self.max {
-            let beyond = self.count.iter().filter(|&&count| count > self.max).count();
-            // Turning the clip is no remedy: its camera turns with it. Turning the vertices within their file is one.
-            let more = match self.max < MAX_PAIRS as usize {
-                true => format!(", or allow up to {MAX_PAIRS} pairs"),
-                false => String::new(),
-            };
-            return Err(refuse(
-                mesh,
-                format!(
-                    "more than {} layer pairs at {beyond} of {pixels} pixels of the clip camera: {most} found; split the mesh into \
-                     several clips (up to {}), or turn the mesh's vertices in its file{more}",
-                    self.max,
-                    Clip::MAX
-                ),
-            ));
-        }
-        Ok(self.maps)
+        };
+        let mut depth: Vec<f32> = bytemuck::pod_collect_to_vec(&crate::host::read_buffer(gpu, &layers)?);
+        depth.truncate(Pairs::layers_len(edge, found.pairs) as usize);
+        Ok(Layers { camera, pairs: found.pairs, depth, milliseconds })
     }
 }

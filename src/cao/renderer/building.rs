@@ -62,8 +62,13 @@ impl Renderer {
     /// From here on the renderer takes the commands as done. They must be submitted, in the order of recording and before
     /// any later use of this renderer reaches the queue; where they are not, call [`Self::invalidate`]. After an error
     /// nothing counts as done, and what was recorded should not be submitted.
+    ///
+    /// # Errors
+    /// Those of the device, and what an update that has run meanwhile found wrong with a clip mesh: see [`Self::set_clips`].
     pub fn record_update(&mut self, rec: &mut Recorder) -> Result<()> {
+        self.hear()?;
         let mut begun = self.begin();
+        self.subject.record_clip_maps(rec)?;
         if let Some((build, made)) = &mut begun.build {
             while !build.ended(self.bricks()) {
                 self.slice(rec, made, build, Budget::Bricks(u32::MAX), None)?;
@@ -93,10 +98,12 @@ impl Renderer {
     /// given back after 90 calls without anything to do: 2 bytes a voxel, with methods `lao` and `cao` 4.
     ///
     /// # Errors
-    /// A budget of 0 bricks, of no time or of no number; those of the device.
+    /// A budget of 0 bricks, of no time or of no number; those of [`Self::record_update`].
     pub fn record_update_within(&mut self, rec: &mut Recorder, budget: Budget) -> Result<Updated> {
         budget.check()?;
+        self.hear()?;
         let mut begun = self.begin();
+        self.subject.record_clip_maps(rec)?;
         let updated = match (&mut begun.build, begun.changed) {
             (Some((build, made)), _) => {
                 self.record_shown(rec, begun.unshown)?;
@@ -121,7 +128,7 @@ impl Renderer {
                 updated
             }
         };
-        self.prepared.0.clear();
+        self.subject.clip_set.settle();
         (self.changed, self.unshown) = (begun.changed, Changed::NOTHING);
         (self.building.build, self.building.spare) = (begun.build, begun.spare);
         Ok(updated)
@@ -162,12 +169,13 @@ impl Renderer {
     }
 
     /// The same as [`Self::record_update`] on the device's own queue, in parts, telling `progress` the share done. Waits for the end; returns
-    /// the time of each stage, clip meshes prepared since the last update included. After an error, or a panic of `progress`, nothing counts
+    /// the time of each stage. After an error, or a panic of `progress`, nothing counts
     /// as done, and the next update computes everything.
     pub fn update(&mut self, progress: &mut dyn FnMut(f64)) -> Result<Timings> {
+        self.hear()?;
         let mut begun = self.begin();
         let gpu = self.subject.gpu.clone();
-        let mut timings = Timings::new();
+        let mut timings = self.subject.make_clip_maps()?;
         if let Some((build, made)) = &mut begun.build {
             let mut bricks = drive::Slice::of(1);
             while !build.ended(self.bricks()) {
@@ -182,11 +190,7 @@ impl Renderer {
                 }
             }
         }
-        if !self.subject.clips_are_prepared() {
-            self.prepare_clips()?;
-        }
         self.take_settings(begun.changed)?;
-        timings.extend(std::mem::take(&mut self.prepared));
         let mut pace = std::mem::take(&mut self.pace);
         let ran = drive::run(&gpu, &self.parts(begun.changed, None), &mut pace, progress);
         self.pace = pace;
@@ -196,8 +200,14 @@ impl Renderer {
     }
 
     /// Takes nothing on the device for granted, so that the next update recomputes everything: after commands of
-    /// [`Self::record_update`] that were never submitted. Clip meshes stay prepared: that never waits for the host.
+    /// [`Self::record_update`] that were never submitted.
     pub fn invalidate(&mut self) {
+        self.subject.clip_set.forget();
+        self.spoil();
+    }
+
+    /// Maps of clip meshes apart, nothing counts as done.
+    pub(super) fn spoil(&mut self) {
         (self.changed, self.unshown) = (Changed::ALL, Changed::ALL);
         (self.building.build, self.building.spare) = (None, None);
     }
@@ -210,9 +220,18 @@ impl Renderer {
         let begun =
             Begun { changed: self.changed, unshown: self.unshown, build: build.take(), spare: spare.take() };
         if begun.changed != Changed::NOTHING || begun.build.is_some() {
-            self.invalidate();
+            self.spoil();
         }
         begun
+    }
+
+    /// What recordings that have run meanwhile found of clip meshes: where the maps of one are to be made again, the clips changed.
+    fn hear(&mut self) -> Result<()> {
+        let heard = self.subject.clip_set.heard();
+        if !matches!(heard, Ok(false)) {
+            self.edited(Changed { clips: true, ..Changed::NOTHING });
+        }
+        heard.map(drop)
     }
 
     /// A build that is known to have ended is none any more.
@@ -225,8 +244,7 @@ impl Renderer {
 
     /// The newest scene is there, whole.
     fn all_done(&mut self, begun: Begun) {
-        // Hosts that only record never ask for these times; they must not pile up.
-        self.prepared.0.clear();
+        self.subject.clip_set.settle();
         (self.changed, self.unshown) = (Changed::NOTHING, Changed::NOTHING);
         self.building.spare = begun.build.map(|(_, made)| made).or(begun.spare);
         (self.building.shown, self.building.idle) = (self.building.updates, 0);
@@ -406,7 +424,8 @@ impl Renderer {
     pub(crate) fn update_opacity(&mut self) -> Result<()> {
         let changed = self.changed.and(self.unshown);
         let whole = if self.is_building() { Changed::ALL } else { changed };
-        self.invalidate();
+        self.spoil();
+        self.subject.make_clip_maps()?;
         self.take_settings(whole)?;
         let mut parts = self.parts(whole, None);
         parts.retain(|part| matches!(part.stage().phase, Phase::Opacity | Phase::Clip));

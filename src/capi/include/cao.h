@@ -603,10 +603,10 @@ CaoResult cao_renderer_set_preset(CaoRenderer renderer, const char *preset);
 // Changes the transfer function to points of the host's own.
 CaoResult cao_renderer_set_transfer(CaoRenderer renderer, const CaoTransfer *transfer);
 
-// Changes how occlusion is computed. Uses the lent queue where the method is another or clips are meshes. NULL is the default.
+// Changes how occlusion is computed. Uses the lent queue where the method is another. NULL is the default.
 CaoResult cao_renderer_set_setup(CaoRenderer renderer, const CaoSetup *setup_info);
 
-// Changes the clips, all of them, at most 8; 0 and NULL for none. Uses the lent queue only where a mesh is new or has a new scale.
+// Changes the clips, all of them, at most 8; 0 and NULL for none. Never uses a queue: maps of meshes are made by the next update.
 CaoResult cao_renderer_set_clips(CaoRenderer renderer,
                                  const CaoClip *clips,
                                  uint32_t clip_count);

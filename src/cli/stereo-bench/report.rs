@@ -113,7 +113,7 @@ pub fn tables(plan: &Plan, all: &[Measured]) -> String {
             m.method.name()
         ));
     }
-    line("            medians; one submission a frame, which the host makes, and those of a clip mesh of another form".into());
+    line("            medians; one submission a frame, which the host makes".into());
     if let Some(budget) = plan.draw_budget_ms {
         line(String::new());
         line(format!(

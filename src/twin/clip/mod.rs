@@ -5,4 +5,5 @@ pub mod classify;
 pub mod clip_bricks;
 pub mod clips;
 pub mod dilate;
+pub mod pairs;
 pub mod peel;
