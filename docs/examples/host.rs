@@ -1,8 +1,8 @@
-//! A host with a Vulkan of its own, in miniature: it lends its device, records a frame into its command buffer, submits it
+//! A host with a Vulkan of its own, in miniature: it lends its device and its images, records a frame into its command buffer, submits it
 //! itself. `cargo run --release --example host`.
 
 use cao::gpu::ash::{self, vk};
-use cao::gpu::{Access, Adopted, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao::gpu::{Adopted, Format, Gpu, ImageState, ImageUse, Lent};
 use cao::renderer::{Target, Targets};
 use cao::{Clip, Look, Renderer, Setup, Shape, StereoRig, TransferFunction};
 use std::error::Error;
@@ -83,9 +83,45 @@ impl Host {
         }
     }
 
-    fn destroy(self) {
+    /// What an engine renders to: a layer an eye, with its memory.
+    fn target(
+        &self,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<(vk::Image, vk::DeviceMemory), Box<dyn Error>> {
+        let create = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format)
+            .extent(vk::Extent3D { width: SIZE[0], height: SIZE[1], depth: 1 })
+            .mip_levels(1)
+            .array_layers(2)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .usage(usage);
+        // SAFETY: the calls follow Vulkan's rules.
+        unsafe {
+            let image = self.device.create_image(&create, None)?;
+            let needs = self.device.get_image_memory_requirements(image);
+            let types = self.instance.get_physical_device_memory_properties(self.physical);
+            let local = |i: &u32| {
+                let flags = types.memory_types[*i as usize].property_flags;
+                needs.memory_type_bits >> i & 1 == 1 && flags.contains(vk::MemoryPropertyFlags::DEVICE_LOCAL)
+            };
+            let kind = (0..types.memory_type_count).find(local).ok_or("no memory for images")?;
+            let allocate =
+                vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind);
+            let memory = self.device.allocate_memory(&allocate, None)?;
+            self.device.bind_image_memory(image, memory, 0)?;
+            Ok((image, memory))
+        }
+    }
+
+    fn destroy(self, targets: [(vk::Image, vk::DeviceMemory); 2]) {
         // SAFETY: nothing made of them is alive any more.
         unsafe {
+            for (image, memory) in targets {
+                self.device.destroy_image(image, None);
+                self.device.free_memory(memory, None);
+            }
             self.device.destroy_command_pool(self.pool, None);
             self.device.destroy_device(None);
             self.instance.destroy_instance(None);
@@ -93,10 +129,8 @@ impl Host {
     }
 }
 
-fn target(gpu: &Gpu, format: Format) -> cao::gpu::Result<Image> {
-    let (kind, usage) = (ImageKind::D2, ImageUse::ATTACHMENT);
-    gpu.image("target", &ImageDesc { dims: [256, 256, 1], layers: 2, format, kind, usage })
-}
+/// Pixels of an eye.
+const SIZE: [u32; 2] = [256, 256];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let host = Host::new()?;
@@ -106,8 +140,23 @@ fn main() -> Result<(), Box<dyn Error>> {
     let transfer = TransferFunction::preset("auto", volume.range())?;
     let setup = Setup::new(volume.min_spacing());
     // Uses the queue that the host lends; the frames below never do.
-    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, Format::Rgba16Float)?;
-    let (colour, depth) = (target(&gpu, Format::Rgba16Float)?, target(&gpu, Format::D32Float)?);
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, Format::Rgba8Srgb)?;
+    let eyes = host.target(vk::Format::R8G8B8A8_SRGB, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+    let planes = host.target(vk::Format::D32_SFLOAT, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT)?;
+    // This host draws nothing of its own before: what its images hold is given up.
+    let lend = |image, format, state: ImageState| Lent {
+        image,
+        size: SIZE,
+        layers: 2,
+        format,
+        usage: ImageUse::ATTACHMENT,
+        before: ImageState { layout: vk::ImageLayout::UNDEFINED, ..state },
+        after: state,
+    };
+    let colour = lend(eyes.0, Format::Rgba8Srgb, ImageState::COLOUR_ATTACHMENT);
+    let depth = lend(planes.0, Format::D32Float, ImageState::DEPTH_ATTACHMENT);
+    // SAFETY: the images are as described, are left and wanted so in every frame, and outlive what is made of them.
+    let (colour, depth) = unsafe { (gpu.adopt_image("eyes", &colour)?, gpu.adopt_image("planes", &depth)?) };
     let views = StereoRig::framing(volume.size_mm(), 30.0, 20.0).views(1.0, 1.0, 500.0)?;
 
     for frame in 0..3 {
@@ -120,15 +169,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         // SAFETY: the command buffer is recording and submitted once below; `recorded` is kept until it has run.
         let mut rec = unsafe { gpu.record_into(cmd) };
         renderer.record_update(&mut rec)?;
-        rec.discard(&colour);
-        rec.discard(&depth);
-        rec.barrier(&[], &[Access::AttachmentWrite]);
-        renderer.record_draw(
-            &mut rec,
-            &views,
-            &Look::default(),
-            &Targets::new(&Target::layers(&colour, &depth, views.len()), [256, 256]),
-        )?;
+        rec.acquire(&colour)?;
+        rec.acquire(&depth)?;
+        let targets = Target::layers(&colour, &depth, views.len());
+        renderer.record_draw(&mut rec, &views, &Look::default(), &Targets::new(&targets, SIZE))?;
+        rec.release(&colour)?;
+        rec.release(&depth)?;
         let recorded = rec.finish()?;
         host.submit_and_wait(cmd)?;
         let stages = recorded.timings()?.ok_or("the host has waited")?;
@@ -136,6 +182,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     drop((renderer, colour, depth));
     drop(gpu);
-    host.destroy();
+    host.destroy([eyes, planes]);
     Ok(())
 }

@@ -1,6 +1,6 @@
-//! Images of a host: its swapchain's, its render targets, its depth. Used as they are, never destroyed here. The only place with barriers
-//! for single images: [`Recorder::acquire`] takes one over in the state that the host left it in, [`Recorder::release`] gives it back in
-//! the state that the host wants next.
+//! Images of a host: its swapchain's, its render targets, its depth. Used as they are, never destroyed here. And the only place with barriers
+//! for single images: [`Recorder::acquire`] takes a host's over in the state that the host left it in, [`Recorder::release`] gives it back in
+//! the state that the host wants next, [`Recorder::discard`] begins one of ours.
 
 use super::{
     Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder,
@@ -133,6 +133,18 @@ fn layout(desc: &ImageDesc) -> vk::ImageLayout {
 }
 
 impl Recorder {
+    /// Gives up an image's content and moves it to the GENERAL layout, in which it stays; once before its first use. It waits for
+    /// all that was recorded before, and all that follows waits for it. An image of another device, or of a host, is left alone; its uses
+    /// are refused.
+    pub fn discard(&mut self, image: &Image) {
+        if !Arc::ptr_eq(&image.0.gpu, &self.gpu) || image.0.host.is_some() {
+            return;
+        }
+        let ours = ours(image);
+        self.transfer(image, ImageState { layout: vk::ImageLayout::UNDEFINED, ..ours }, ours, None, None);
+        self.hazards.discard(image.0.id);
+    }
+
     /// Takes a host's image over: from the state that the host left it in. What follows waits for it.
     ///
     /// # Errors

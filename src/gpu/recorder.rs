@@ -1,7 +1,7 @@
 //! Recording of commands, into a command buffer of our own or of a host.
 
 use super::{
-    Buffer, Gpu, Image, Pipeline,
+    Buffer, Gpu, Pipeline,
     access::Access,
     bind::{Bind, Bindings, Keep, Resolved, resolve},
     counts::Counts,
@@ -99,35 +99,6 @@ impl Gpu {
 }
 
 impl Recorder {
-    /// Gives up an image's content and moves it to the GENERAL layout, in which it stays; once before its first use. It waits for
-    /// all that was recorded before, and all that follows waits for it. An image of another device, or of a host, is left alone; its uses
-    /// are refused.
-    pub fn discard(&mut self, image: &Image) {
-        if !Arc::ptr_eq(&image.0.gpu, &self.gpu) || image.0.host.is_some() {
-            return;
-        }
-        use vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
-        let barrier = [vk::ImageMemoryBarrier2::default()
-            .src_stage_mask(S::ALL_COMMANDS)
-            .src_access_mask(A::MEMORY_WRITE)
-            .dst_stage_mask(S::ALL_COMMANDS)
-            .dst_access_mask(A::MEMORY_READ | A::MEMORY_WRITE)
-            .old_layout(vk::ImageLayout::UNDEFINED)
-            .new_layout(vk::ImageLayout::GENERAL)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .image(image.0.raw)
-            .subresource_range(image.0.all())];
-        // SAFETY: `cmd` is recording (ours, or by the promise of `record_into`), the image is alive and kept.
-        unsafe {
-            let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
-            (self.gpu.v13.cmd_pipeline_barrier2)(self.cmd, &info);
-        }
-        self.count(0, 1);
-        self.hazards.discard(image.0.id);
-        self.keep.push(image.0.clone());
-    }
-
     /// One global memory barrier: every access of the kinds `before` recorded so far happens before every access of the kinds `after`
     /// recorded later.
     pub fn barrier(&mut self, before: &[Access], after: &[Access]) {
