@@ -607,9 +607,7 @@ CaoResult cao_renderer_set_transfer(CaoRenderer renderer, const CaoTransfer *tra
 CaoResult cao_renderer_set_setup(CaoRenderer renderer, const CaoSetup *setup_info);
 
 // Changes the clips, all of them, at most 8; 0 and NULL for none. Never uses a queue: maps of meshes are made by the next update.
-CaoResult cao_renderer_set_clips(CaoRenderer renderer,
-                                 const CaoClip *clips,
-                                 uint32_t clip_count);
+CaoResult cao_renderer_set_clips(CaoRenderer renderer, const CaoClip *clips, uint32_t clip_count);
 
 // Overwrites a box of voxels, the first of which is `first`, by a volume of the same type. Uses the lent queue and waits for it.
 CaoResult cao_renderer_set_values(CaoRenderer renderer, const uint32_t *first, CaoVolume values);
