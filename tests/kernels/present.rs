@@ -1,27 +1,15 @@
 //! The kernel `present`: attachments of every colour format hold what the picture holds, rounded to that format.
 
 use cao::draw::picture::Picture;
-use cao::renderer::{COLOUR, Drawn, Place, Quality, Renderer, Target, Targets};
+use cao::renderer::{COLOUR, Drawn, Place, Quality, Target, Targets};
 use cao_gpu::{Access, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Recorder};
 use cao_model::builtin::builtin_box;
 use cao_model::look::Look;
-use cao_model::settings::Setup;
-use cao_model::transfer::TransferFunction;
 use cao_model::view::{View, with_insets};
 use cao_testing::*;
 
 /// Neither is a multiple of a tile.
 const SIZE: [u32; 2] = [37, 29];
-
-/// A renderer of a small volume, up to date, that draws into this format.
-fn renderer(gpu: &Gpu, colour: Format) -> Renderer {
-    let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
-    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let setup = Setup::new(volume.min_spacing());
-    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, colour).unwrap();
-    renderer.update(&mut |_| ()).unwrap();
-    renderer
-}
 
 fn views(count: usize) -> Vec<View> {
     let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
@@ -68,7 +56,7 @@ fn attachments_hold_the_picture_rounded_to_their_format() {
         // Half a step, 0.6 of one where a device is allowed its error.
         (Format::Rgba8Unorm, 0.6 / 255.0),
     ] {
-        let renderer = renderer(&gpu, format);
+        let renderer = fruit(&gpu, format);
         for count in 1..=View::MAX {
             let (views, look) = (views(count), Look::default());
             let [colour, depth] = attachments(&gpu, format, count as u32);
@@ -111,7 +99,7 @@ fn attachments_hold_the_picture_rounded_to_their_format() {
 #[test]
 fn a_smaller_picture_fills_the_attachments() {
     let gpu = open();
-    let renderer = renderer(&gpu, COLOUR);
+    let renderer = fruit(&gpu, COLOUR);
     let (views, look) = (views(2), Look { budget_ms: Some(1e-6), ..Look::default() });
     let [colour, depth] = attachments(&gpu, COLOUR, 2);
     let picture = Picture::new(&gpu, SIZE, 2).unwrap();
@@ -183,7 +171,7 @@ fn a_smaller_picture_fills_the_attachments() {
 #[test]
 fn what_does_not_fit_is_refused_by_name() {
     let gpu = open();
-    let renderer = renderer(&gpu, COLOUR);
+    let renderer = fruit(&gpu, COLOUR);
     let (views, look) = (views(2), Look::default());
     let mut rec = gpu.recorder("refused").unwrap();
     let picture = Picture::new(&gpu, SIZE, 3).unwrap();

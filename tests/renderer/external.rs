@@ -167,16 +167,6 @@ fn forms() -> Vec<Form> {
     ]
 }
 
-/// A renderer of a small volume, up to date.
-fn renderer(gpu: &Gpu, colour: Format) -> Renderer {
-    let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
-    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let setup = Setup::new(volume.min_spacing());
-    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, colour).unwrap();
-    renderer.update(&mut |_| ()).unwrap();
-    renderer
-}
-
 /// All layers of an image of ours, one after the other.
 fn texels(gpu: &Gpu, image: &Image) -> Vec<[f32; 4]> {
     let layers = image.desc().layers;
@@ -208,7 +198,7 @@ fn lend(
 fn every_form_and_format_holds_the_picture_over_what_was_there() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
-    let renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let renderer = fruit(&gpu, Format::Rgba8Srgb);
     let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
     let all = with_insets(eyes(&volume, 30.0), 0.5).unwrap();
     let look = Look::default();
@@ -495,7 +485,7 @@ fn a_hosts_sphere_ends_rays_in_every_convention_and_format() {
 fn images_that_are_not_held_or_not_lent_are_refused_by_name() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
-    let renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let renderer = fruit(&gpu, Format::Rgba8Srgb);
     let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
     let views = eyes(&volume, 30.0);
     let state = ImageState::COLOUR_ATTACHMENT;
@@ -556,7 +546,7 @@ fn images_that_are_not_held_or_not_lent_are_refused_by_name() {
 fn views_may_come_after_the_frame_was_submitted() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
-    let renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let renderer = fruit(&gpu, Format::Rgba8Srgb);
     let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
     let (guess, known) = (eyes(&volume, 30.0), eyes(&volume, 48.0));
     let look = Look::default();
@@ -606,7 +596,7 @@ fn views_may_come_after_the_frame_was_submitted() {
 fn updates_and_drawings_are_ordered_by_a_timeline_alone() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
-    let mut renderer = renderer(&gpu, Format::Rgba8Srgb);
+    let mut renderer = fruit(&gpu, Format::Rgba8Srgb);
     let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
     let (views, look) = (eyes(&volume, 30.0), Look::default());
     // SAFETY: the device has timeline semaphores.

@@ -13,6 +13,7 @@ use cao::field::volume_image;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOptions, Recorder};
 use cao_measure::random::Random;
+use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::{METHODS, Method};
@@ -257,6 +258,16 @@ pub fn unoccluded(gpu: &Gpu, volume: &Volume, transfer: TransferFunction, clips:
     setup.occlusion.radius_mm = 0.0;
     let mut renderer = Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap();
     renderer.set_clips(clips).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    renderer
+}
+
+/// A renderer of a small volume by the default method, up to date, that draws into this format.
+pub fn fruit(gpu: &Gpu, colour: Format) -> Renderer {
+    let volume = builtin_box("fruit", [16, 18, 14], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let setup = Setup::new(volume.min_spacing());
+    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, colour).unwrap();
     renderer.update(&mut |_| ()).unwrap();
     renderer
 }
