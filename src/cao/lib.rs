@@ -19,6 +19,7 @@
 //! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
 //! | [`cast`] [`rays`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
 //! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
+//! | [`by_brick`] | what methods have in common that compute brick by brick from V_o alone |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
 //! | [`verify`] | instruments: is it exact, do both eyes see the same, what would other settings give |
 //! | [`stages`] | every stage whose time is taken |
@@ -62,6 +63,7 @@
 
 pub mod ambient;
 pub mod build;
+pub mod by_brick;
 pub mod cast;
 pub mod clip;
 pub mod draw;

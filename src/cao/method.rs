@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::ambient::Ambient;
+use crate::by_brick::ByBrick;
 use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
 use crate::rays::traced::Traced;
@@ -28,7 +29,7 @@ const MAKERS: &[Maker] = &[
         map_radius: |on| Some(crate::cast::map_radius(on)),
     },
     // Changes are found in the opacities; nothing is dilated.
-    Maker { method: Method::Rays, new: |on| Ok(Box::new(Traced::new(on)?)), map_radius: |_| None },
+    Maker { method: Method::Rays, new: |on| Ok(Box::new(ByBrick::<Traced>::new(on)?)), map_radius: |_| None },
 ];
 
 fn maker(on: &Subject) -> &'static Maker {

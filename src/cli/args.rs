@@ -8,6 +8,7 @@ use cao_model::clip::Shape;
 use cao_model::error::shown_path;
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
+use cao_model::options::{KEYS, Key, Options};
 use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Endian;
@@ -116,6 +117,34 @@ pub struct Settings {
     /// Distance in mm between their samples [default: the smallest spacing]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
+    /// What single methods take beside.
+    #[arg(long = "option", value_name = "NAME=VALUE", value_parser = option, help = options_help())]
+    pub options: Vec<(String, String)>,
+}
+
+fn option(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    // Whether it is one, and takes this.
+    Options::default().set(name, value).map_err(|error| error.to_string())?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+fn options_help() -> String {
+    let of = |key: &Key| {
+        let takers = METHODS.iter().filter(|entry| entry.options.contains(&key.name));
+        let takers: Vec<&str> = takers.map(|entry| entry.name).collect();
+        let default = Options::DEFAULT.value(key.name).unwrap_or_default();
+        format!("{} of {}: {} [default: {default}]", key.name, takers.join(", "), key.takes)
+    };
+    format!("What single methods take beside; again for each. {}", KEYS.each_ref().map(of).join("; "))
+}
+
+impl Settings {
+    /// These options with what is asked for.
+    pub fn options(&self, mut options: Options) -> cao_model::Result<Options> {
+        self.options.iter().try_for_each(|(name, value)| options.set(name, value))?;
+        Ok(options)
+    }
 }
 
 fn rays_help() -> String {
@@ -239,6 +268,7 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
     occlusion.offset_mm = settings.offset_mm;
     occlusion.step_mm = settings.step_mm;
+    setup.options = settings.options(setup.options)?;
     setup.check(volume.min_spacing())?;
     Ok(setup)
 }

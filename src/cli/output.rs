@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::error::shown_path;
+use cao_model::options::Options;
 use cao_model::order::Layout;
 use cao_model::settings::Setup;
 use cao_model::volume::Volume;
@@ -82,13 +83,16 @@ impl Out {
         let o = setup.occlusion;
         let (rays, quadrature, spacing) = (o.rays.name(), o.quadrature.name(), volume.min_spacing());
         let (samples, step, first) = (o.samples(spacing), o.step(spacing), o.first(spacing));
+        let given = setup.options.other_than(&Options::DEFAULT);
+        let options: String = given.iter().map(|(name, value)| format!(", {name} {value}")).collect();
         self.line(format!(
-            "method    {methods}, rays {rays}, quadrature {quadrature}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
+            "method    {methods}, rays {rays}, quadrature {quadrature}{options}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
             o.radius_mm,
         ));
         self.json(json!({
             "rays": rays, "quadrature": quadrature, "radius_mm": o.radius_mm,
-            "samples": samples, "step_mm": step, "first_sample_mm": first
+            "samples": samples, "step_mm": step, "first_sample_mm": first,
+            "options": given.into_iter().collect::<std::collections::BTreeMap<_, _>>()
         }));
     }
 

@@ -29,6 +29,7 @@
 //!     radius_mm = 20                   # default: 20 of the smallest spacing
 //!     offset_mm = 0.5                  # where rays start; default: half a step
 //!     step_mm = 1                      # default: the smallest spacing
+//!     ## options = { levels = "mip" }   # what single methods take beside: cao render --help lists them
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
@@ -86,6 +87,7 @@ use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
@@ -183,6 +185,8 @@ pub struct OcclusionSettings {
     pub offset_mm: Option<f32>,
     /// Distance of samples in mm; `None` is the smallest spacing.
     pub step_mm: Option<f32>,
+    /// What the method takes beside.
+    pub options: Options,
 }
 
 impl Default for OcclusionSettings {
@@ -196,6 +200,7 @@ impl Default for OcclusionSettings {
             radius_mm: None,
             offset_mm: None,
             step_mm: None,
+            options: Options::DEFAULT,
         }
     }
 }
@@ -214,7 +219,7 @@ impl OcclusionSettings {
             offset_mm: self.offset_mm,
             step_mm: self.step_mm,
         };
-        let setup = Setup { occlusion, scope: self.scope, ..usual };
+        let setup = Setup { occlusion, options: self.options, scope: self.scope, ..usual };
         setup.check(min_spacing).map_err(|error| error.under("occlusion"))?;
         Ok(setup)
     }
@@ -490,6 +495,7 @@ struct OcclusionFile {
     radius_mm: Option<f64>,
     offset_mm: Option<f64>,
     step_mm: Option<f64>,
+    options: Option<toml::Table>,
     scope: Option<String>,
 }
 
@@ -697,6 +703,11 @@ impl OcclusionFile {
         ] {
             length(key, value, zero)?;
         }
+        let mut options = Options::default();
+        for (name, value) in self.options.unwrap_or_default() {
+            let text = value.as_str().map_or_else(|| shown(&value), str::to_owned);
+            options.set(&name, &text).map_err(|error| error.under("occlusion.options"))?;
+        }
         Ok(OcclusionSettings {
             method,
             scope,
@@ -705,6 +716,7 @@ impl OcclusionFile {
             radius_mm: self.radius_mm.map(|mm| mm as f32),
             offset_mm: self.offset_mm.map(|mm| mm as f32),
             step_mm: self.step_mm.map(|mm| mm as f32),
+            options,
         })
     }
 }

@@ -23,6 +23,7 @@ use cao_gpu::{Gpu, Phase, Timings};
 use cao_model::METHODS;
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::{Scope, Setup};
 use cao_twin::Grid;
 use std::collections::HashMap;
@@ -60,12 +61,16 @@ pub struct Candidate {
     pub method: Method,
     /// Rays, rule, lengths.
     pub occlusion: Occlusion,
+    /// What the method takes beside.
+    pub options: Options,
 }
 
 impl std::fmt::Display for Candidate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Occlusion { rays, quadrature, .. } = self.occlusion;
-        write!(f, "method {}, rays {}, quadrature {}", self.method.name(), rays.name(), quadrature.name())
+        write!(f, "method {}, rays {}, quadrature {}", self.method.name(), rays.name(), quadrature.name())?;
+        let given = self.options.other_than(&Options::DEFAULT);
+        given.iter().try_for_each(|(name, value)| write!(f, ", {name} {value}"))
     }
 }
 
@@ -108,12 +113,14 @@ pub fn candidates(
     let mut list = Vec::new();
     for entry in METHODS.iter().filter(chosen) {
         // Sets that a method does not list are for who asks for them.
-        let sets = rays.as_ref().map_or(entry.sets, std::slice::from_ref);
+        let asked = rays.as_ref().filter(|rays| entry.method.follows(**rays));
+        let sets = asked.map_or(entry.sets, std::slice::from_ref);
         for &rays in sets {
             for &rule in entry.quadratures.iter().filter(|rule| quadrature.is_none_or(|only| **rule == only))
             {
                 let occlusion = Occlusion { rays, quadrature: rule, ..setup.occlusion };
-                list.push(Candidate { method: entry.method, occlusion });
+                let with = |options| Candidate { method: entry.method, occlusion, options };
+                list.extend(entry.method.variants().map(with));
             }
         }
     }
@@ -225,9 +232,9 @@ fn try_all(
     let (casts, wholes): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|c| probed(c));
     let part = |done: usize| done as f64 / candidates.len() as f64;
     for (i, &candidate) in wholes.iter().enumerate() {
-        let Candidate { method, occlusion } = candidate;
+        let Candidate { method, occlusion, options } = candidate;
         if !tried.hopeless(&candidate) {
-            match renderer.set_setup(Setup { method, occlusion, ..setup }) {
+            match renderer.set_setup(Setup { method, occlusion, options, ..setup }) {
                 Ok(()) => {
                     let (values, ms) = whole(renderer)?;
                     let (rmse, bound) = judge(samples, |_, voxel| values[voxel]);
@@ -509,7 +516,8 @@ mod tests {
     use cao_gpu::Stage;
 
     fn calibration(list: &[(f64, f64)]) -> Calibration {
-        let candidate = Candidate { method: Method::Lao, occlusion: Occlusion::paper(1.0) };
+        let candidate =
+            Candidate { method: Method::Lao, occlusion: Occlusion::paper(1.0), options: Options::DEFAULT };
         let one = |&(bound, ms): &(f64, f64)| Measured { candidate, rmse: 0.9 * bound, bound, ms };
         Calibration { measured: list.iter().map(one).collect(), bricks: vec![0], needed: vec![0] }
     }
@@ -573,7 +581,11 @@ mod tests {
 
     #[test]
     fn only_candidates_that_cannot_be_chosen_are_left_out() {
-        let of = |method, rays| Candidate { method, occlusion: Occlusion { rays, ..Occlusion::paper(1.0) } };
+        let of = |method, rays| Candidate {
+            method,
+            occlusion: Occlusion { rays, ..Occlusion::paper(1.0) },
+            options: Options::DEFAULT,
+        };
         let new = |budget, limit| Tried {
             budget: Some(budget),
             limit,

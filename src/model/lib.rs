@@ -13,6 +13,7 @@ pub mod memory;
 pub mod mesh;
 pub mod methods;
 pub mod occlusion;
+pub mod options;
 pub mod order;
 pub mod samples;
 pub mod settings;

@@ -3,6 +3,7 @@
 
 use crate::error::quoted;
 use crate::occlusion::{Quadrature, RaySet};
+use crate::options::Options;
 use crate::{Error, Result};
 
 /// A method of ambient occlusion.
@@ -29,12 +30,16 @@ pub struct Entry {
     pub what: &'static str,
     /// Where it comes from.
     pub source: &'static str,
-    /// The rays that it follows unless others are asked for.
+    /// The rays that it follows unless others are asked for; [`RaySet::None`] where it follows none.
     pub rays: RaySet,
     /// The rules that it can integrate rays by; the first unless another is asked for.
     pub quadratures: &'static [Quadrature],
     /// The ray sets that charts and the planner try, in the order of their cost; others are for who asks for them.
     pub sets: &'static [RaySet],
+    /// Names of the [options](Options) that it takes.
+    pub options: &'static [&'static str],
+    /// Options that charts and the planner try, names and values; the first is none, the method as it is.
+    pub variants: &'static [&'static [(&'static str, &'static str)]],
     /// Whether an update computes only what a change affects; else everything.
     pub contextual: bool,
     /// The method whose values it has, bit for bit; itself where no other has them.
@@ -52,6 +57,8 @@ pub static METHODS: &[Entry] = &[
         rays: RaySet::R26,
         quadratures: &Quadrature::CAST,
         sets: &RaySet::ALL,
+        options: &[],
+        variants: &[&[]],
         contextual: false,
         same_values_as: Method::Lao,
     },
@@ -64,6 +71,8 @@ pub static METHODS: &[Entry] = &[
         rays: RaySet::R26,
         quadratures: &Quadrature::CAST,
         sets: &RaySet::ALL,
+        options: &[],
+        variants: &[&[]],
         contextual: true,
         same_values_as: Method::Lao,
     },
@@ -82,6 +91,8 @@ pub static METHODS: &[Entry] = &[
             RaySet::Spiral(96),
             RaySet::Spiral(192),
         ],
+        options: &[],
+        variants: &[&[]],
         contextual: true,
         same_values_as: Method::Rays,
     },
@@ -134,6 +145,17 @@ impl Method {
         self.entry().quadratures.contains(&rule)
     }
 
+    /// Whether it follows such rays: some, or none.
+    pub fn follows(self, rays: RaySet) -> bool {
+        (self.rays() == RaySet::None) == (rays == RaySet::None)
+    }
+
+    /// The options that charts and the planner try.
+    pub fn variants(self) -> impl Iterator<Item = Options> {
+        let listed = self.entry().variants.iter();
+        listed.map(|given| Options::DEFAULT.with(given).expect("variants are options"))
+    }
+
     /// The method whose values it has, bit for bit; itself where no other has them.
     pub fn values(self) -> Self {
         self.entry().same_values_as
@@ -163,6 +185,12 @@ mod tests {
     fn entries_agree_with_themselves_and_with_those_whose_values_they_have() {
         for entry in METHODS {
             assert!(entry.sets.contains(&entry.rays) && !entry.quadratures.is_empty(), "{}", entry.name);
+            assert!(entry.sets.iter().all(|set| entry.method.follows(*set)), "{}", entry.name);
+            let options = entry.method.variants();
+            assert_eq!(entry.method.variants().next(), Some(Options::DEFAULT), "{}", entry.name);
+            for (name, _) in options.flat_map(|options| options.other_than(&Options::DEFAULT)) {
+                assert!(entry.options.contains(&name), "{}: {name}", entry.name);
+            }
             let like = entry.method.values().entry();
             assert_eq!(like.same_values_as, like.method, "{}: whose values are a third's", entry.name);
             assert_eq!(like.quadratures, entry.quadratures, "{}", entry.name);

@@ -28,6 +28,8 @@ pub enum RaySet {
     W50,
     /// So many on a [`spiral`], equal weights: even, 2 … [`RaySet::MOST`].
     Spiral(u8),
+    /// No rays, of methods that follow none.
+    None,
 }
 
 impl RaySet {
@@ -48,6 +50,7 @@ impl RaySet {
             Self::W26 => "26w",
             Self::W50 => "50w",
             Self::Spiral(count) => return format!("spiral:{count}"),
+            Self::None => "none",
         };
         name.into()
     }
@@ -56,7 +59,7 @@ impl RaySet {
     pub fn parse(name: &str) -> Result<Self> {
         let set = match name.strip_prefix("spiral:") {
             Some(count) => count.parse().ok().map(Self::Spiral).filter(|set| set.check().is_ok()),
-            None => Self::ALL.into_iter().find(|set| set.name() == name),
+            None => Self::ALL.into_iter().chain([Self::None]).find(|set| set.name() == name),
         };
         set.ok_or_else(|| {
             let sets = Self::ALL.map(Self::name).join(", ");
@@ -116,7 +119,7 @@ impl RaySet {
                 ([1, 1, 1], 27.0 / 1280.0),
                 ([3, 1, 1], 14641.0 / 725_760.0),
             ],
-            Self::Spiral(_) => &[],
+            Self::Spiral(_) | Self::None => &[],
         };
         orbits.iter().flat_map(|&(v, weight)| orbit(v).into_iter().map(move |d| (d, weight))).collect()
     }

@@ -1,7 +1,8 @@
 //! How occlusion is computed: everything that a renderer can be told about it, as plain data.
 
 use crate::methods::Method;
-use crate::occlusion::Occlusion;
+use crate::occlusion::{Occlusion, RaySet};
+use crate::options::Options;
 use crate::{Error, Result};
 
 /// How occlusion is computed.
@@ -11,6 +12,8 @@ pub struct Setup {
     pub occlusion: Occlusion,
     /// Which method.
     pub method: Method,
+    /// What this method takes beside.
+    pub options: Options,
     /// Which voxels get a value.
     pub scope: Scope,
     /// Samples at cut voxels.
@@ -26,27 +29,51 @@ impl Setup {
         Self {
             occlusion: Occlusion { rays: method.rays(), quadrature: method.quadrature(), ..paper },
             method,
+            options: Options::DEFAULT,
             scope: Scope::Needed,
             anti_aliasing: AntiAliasing::N32,
             maps: MapSettings::default(),
         }
     }
 
-    /// Refuses lengths and rays that there are none of, and a rule that the method does not have.
+    /// Refuses lengths and rays that there are none of, and a rule, rays or an option that the method does not have.
     ///
     /// # Errors
-    /// As [`Occlusion::check`], and [`Error::Config`] naming the rule and those that there are.
+    /// As [`Occlusion::check`], and [`Error::Config`] naming what the method has not, and what it has.
     pub fn check(&self, min_spacing: f64) -> Result<()> {
         self.occlusion.check(min_spacing)?;
         let (rule, entry) = (self.occlusion.quadrature, self.method.entry());
-        if self.method.has(rule) {
-            return Ok(());
+        if !self.method.has(rule) {
+            let own: Vec<&str> = entry.quadratures.iter().map(|rule| rule.name()).collect();
+            let problem = format!(
+                "{:?} is no rule of method {}, which has {}",
+                rule.name(),
+                entry.name,
+                own.join(", ")
+            );
+            return Err(Error::refused("quadrature", problem));
         }
-        let own: Vec<&str> = entry.quadratures.iter().map(|rule| rule.name()).collect();
-        Err(Error::refused(
-            "quadrature",
-            format!("{:?} is no rule of method {}, which has {}", rule.name(), entry.name, own.join(", ")),
-        ))
+        let rays = self.occlusion.rays;
+        if !self.method.follows(rays) {
+            let problem = match rays {
+                RaySet::None => {
+                    format!("method {} follows rays; expected {}, say", entry.name, entry.rays.name())
+                }
+                _ => format!("{:?}, but method {} follows no rays", rays.name(), entry.name),
+            };
+            return Err(Error::refused("rays", problem));
+        }
+        for (name, _) in self.options.other_than(&Options::DEFAULT) {
+            if !entry.options.contains(&name) {
+                let has = match entry.options {
+                    [] => "none".to_owned(),
+                    some => some.join(", "),
+                };
+                let problem = format!("{name:?} is no option of method {}, which has {has}", entry.name);
+                return Err(Error::refused("option", problem));
+            }
+        }
+        Ok(())
     }
 
     /// The default method: what to use where the paper's numbers are not the point.

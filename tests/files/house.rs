@@ -241,8 +241,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/samples.rs", &["error"]),
     ("src/model/look.rs", &["error", "samples"]),
     ("src/model/memory.rs", &[]),
-    ("src/model/methods.rs", &["error", "occlusion"]),
-    ("src/model/settings.rs", &["error", "methods", "occlusion"]),
+    ("src/model/options.rs", &["error"]),
+    ("src/model/methods.rs", &["error", "occlusion", "options"]),
+    ("src/model/settings.rs", &["error", "methods", "occlusion", "options"]),
     ("src/model/clip.rs", &["error", "mesh"]),
     ("src/model/order.rs", &[]),
     ("src/model/volume.rs", &["error", "order", "transfer", "values"]),
@@ -310,8 +311,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/build.rs", &["error", "stages", "ambient"]),
     // The methods.
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
-    ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
-    ("src/cao/method.rs", &["error", "subject", "ambient", "cast", "rays"]),
+    ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
+    ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
+    ("src/cao/method.rs", &["error", "subject", "ambient", "by_brick", "cast", "rays"]),
     ("src/cao/renderer.rs", &["error", "host", "drive", "field", "draw", "subject", "ambient", "method"]),
     ("src/cao/renderer/", &["ambient", "build", "clip", "draw", "drive", "error", "field", "stages"]),
     // Instruments take the renderer.

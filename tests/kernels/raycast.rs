@@ -24,6 +24,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::samples::Filter;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
@@ -67,6 +68,7 @@ fn setup(maps: MapSettings) -> Setup {
             step_mm: None,
         },
         method: Method::Cao,
+        options: Options::DEFAULT,
         scope: Scope::All,
         anti_aliasing: AntiAliasing::N32,
         maps,

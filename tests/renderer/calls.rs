@@ -10,6 +10,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
@@ -98,6 +99,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                 step_mm: lengths.2,
             },
             method,
+            options: Options::DEFAULT,
             scope: if all { Scope::All } else { Scope::Needed },
             anti_aliasing: if smooth { AntiAliasing::N8 } else { AntiAliasing::N0 },
             maps: MapSettings { resolution: maps.0, cells: maps.1, pairs: maps.2, literal: maps.3 },

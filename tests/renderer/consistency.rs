@@ -11,6 +11,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -34,6 +35,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet, method: Method) -> Rendere
             step_mm: None,
         },
         method,
+        options: Options::DEFAULT,
         scope: Scope::Needed,
         anti_aliasing: AntiAliasing::N32,
         maps: MapSettings { resolution: 128, cells: 64, pairs: 4, literal: false },

@@ -6,6 +6,7 @@ use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -30,6 +31,7 @@ const SETUP: Setup = Setup {
         step_mm: None,
     },
     method: Method::Cao,
+    options: Options::DEFAULT,
     scope: Scope::All,
     anti_aliasing: AntiAliasing::N8,
     maps: MapSettings { resolution: 64, cells: 32, pairs: 4, literal: false },

@@ -14,6 +14,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -30,6 +31,7 @@ fn setup(rays: RaySet, quadrature: Quadrature, radius_mm: f32, scope: Scope) -> 
     Setup {
         occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
         method: Method::Cao,
+        options: Options::DEFAULT,
         scope,
         anti_aliasing: AntiAliasing::N32,
         maps: MAPS,

@@ -8,6 +8,7 @@ use cao_model::look::Look;
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
@@ -29,6 +30,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, method: Method) -> Renderer {
             step_mm: None,
         },
         method,
+        options: Options::DEFAULT,
         scope: Scope::Needed,
         anti_aliasing: AntiAliasing::N8,
         maps: MapSettings { resolution: 64, cells: 32, pairs: 2, literal: false },

@@ -79,9 +79,9 @@ fn what_an_error_budget_chooses_keeps_it_on_bricks_held_back() {
 
 /// Time of one full update of the ambient volume with a setting.
 fn taken(renderer: &mut Renderer, candidate: Candidate) -> f64 {
-    let Candidate { method, occlusion } = candidate;
+    let Candidate { method, occlusion, options } = candidate;
     let method = if method == Method::Cao { Method::Lao } else { method };
-    renderer.set_setup(Setup { method, occlusion, ..*renderer.setup() }).unwrap();
+    renderer.set_setup(Setup { method, occlusion, options, ..*renderer.setup() }).unwrap();
     let mut times: Vec<f64> = (0..3)
         .map(|_| {
             renderer.invalidate();

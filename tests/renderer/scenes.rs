@@ -7,6 +7,7 @@ use cao_model::builtin::builtin_box;
 use cao_model::clip::Clip;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
@@ -23,6 +24,7 @@ fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
     Setup {
         occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
         method,
+        options: Options::DEFAULT,
         scope: Scope::Needed,
         anti_aliasing: AntiAliasing::N32,
         maps: MAPS,

@@ -1,202 +1,28 @@
-//! Rays by brick with contextual updates from change (method.md §4, §5.2): V_o is brought up to date in place and compared with what V_AO
-//! was computed from; bricks within reach of a change are computed anew, with one write a voxel, and no other brick is touched. Exact for
-//! any edit, clips, transfer function, values, radius: a value depends on nothing but the opacities that its rays meet. What needs no
-//! value holds 1, whatever it held before.
-//!
-//! No V_PAO, no mask, no second opacity: 4 bytes a voxel beside the volume, and some 32 bytes a brick of 512.
+//! The method `rays`: rays by brick (method.md §4).
 
 use super::rays::{Bindings, RayPlan, Rays};
 use crate::Result;
-use crate::ambient::{Ambient, Changed, Fields, Recomputation, Recomputed, Written};
-use crate::clip::carve::{self, Carve};
-use crate::clip::classify::{AFFECTED, UNTOUCHED};
-use crate::clip::clip_bricks::ClipBricks;
-use crate::drive::{self, Pace, Part};
-use crate::field::bricks::BrickList;
-use crate::field::near::{self, FAR, Near, TODO};
-use crate::field::{BRICK, Field, volume_image};
-use crate::host::read_buffer;
+use crate::by_brick::{Gather, Target};
+use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, Timings};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 
-/// Device memory of one scene, beside the volume itself.
-struct Volumes {
-    /// V_o: opacity after transfer function and clips, r16unorm.
-    opacity: Image,
-    /// V_AO, r16unorm.
-    ambient: Image,
-    /// Bricks that the last update computed, and those that have values, u32 each.
-    todo: Buffer,
-    /// What the clips do to each brick, u32 each.
-    clip_bricks: Buffer,
-    clip_bricks_before: Buffer,
-    contact: Buffer,
-    change: Buffer,
-    other: Buffer,
-    list: BrickList,
-}
-
-impl Volumes {
-    /// Allocates them for a field: V_o holds 0 and V_AO 1. Uses the device's queue and waits for it.
-    fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
-        if !(gpu.stores(Format::R16Unorm) && gpu.filters(Format::R16Unorm)) {
-            return Err(cao_gpu::Error::Device {
-                problem: "has no filtered storage images of R16_UNORM, which rays by brick need; choose method cao or lao"
-                    .into(),
-            }
-            .into());
-        }
-        let bricks = 4 * u64::from(field.brick_count());
-        let brick_buffer = |name| gpu.buffer(name, bricks, BufferUse::Device);
-        let volumes = Self {
-            opacity: volume_image(gpu, "opacity", field, Format::R16Unorm)?,
-            ambient: volume_image(gpu, "ambient", field, Format::R16Unorm)?,
-            todo: brick_buffer("bricks to do")?,
-            clip_bricks: ClipBricks::buffer(gpu, field)?,
-            clip_bricks_before: ClipBricks::buffer(gpu, field)?,
-            contact: brick_buffer("contact")?,
-            change: brick_buffer("change")?,
-            other: brick_buffer("change, other")?,
-            list: BrickList::new(gpu, field)?,
-        };
-        let mut rec = gpu.recorder("clear volumes")?;
-        rec.discard(&volumes.opacity);
-        rec.discard(&volumes.ambient);
-        rec.barrier(&[], &[Access::TransferWrite]);
-        rec.clear_image(&volumes.opacity, [0.0; 4])?;
-        rec.clear_image(&volumes.ambient, [1.0; 4])?;
-        for buffer in [&volumes.contact, &volumes.clip_bricks_before, &volumes.todo] {
-            rec.fill(buffer, 0, bricks, 0)?;
-        }
-        rec.fill(&volumes.change, 0, bricks, FAR)?;
-        rec.submit_and_wait()?;
-        Ok(volumes)
-    }
-}
-
-/// The kernels.
-struct Kernels {
-    clip_bricks: ClipBricks,
-    carve: Carve,
-    near: Near,
-    rays: Rays,
-}
-
-impl Kernels {
-    /// Builds the pipelines. Uses the device's queue and waits for it.
-    fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self {
-            clip_bricks: ClipBricks::new(gpu)?,
-            carve: Carve::new(gpu)?,
-            near: Near::new(gpu)?,
-            rays: Rays::new(gpu)?,
-        })
-    }
-}
-
-/// The method `rays`.
+/// Rays of the listed bricks.
 pub struct Traced {
-    kernels: Kernels,
-    volumes: Volumes,
+    rays: Rays,
     plan: RayPlan,
 }
 
-/// What is chosen, and where its values go.
-#[derive(Clone, Copy)]
-struct Target<'a> {
-    on: &'a Subject,
-    todo: &'a Buffer,
-    list: &'a BrickList,
-    ambient: &'a Image,
-}
+impl Gather for Traced {
+    const NAME: &str = "rays";
 
-impl Traced {
-    /// Volumes and pipelines for a subject. Uses the device's queue and waits for it.
-    ///
-    /// # Errors
-    /// As [`RayPlan::new`], and those of the device.
-    pub fn new(on: &Subject) -> Result<Self> {
+    fn new(on: &Subject) -> Result<Self> {
         let plan = RayPlan::new(on.field.spacing, &on.setup.occlusion)?;
-        Ok(Self { kernels: Kernels::new(&on.gpu)?, volumes: Volumes::new(&on.gpu, &on.field)?, plan })
+        Ok(Self { rays: Rays::new(&on.gpu)?, plan })
     }
 
-    /// V_o in place, and which bricks changed.
-    fn carve<'a>(&'a self, on: &'a Subject, changed: Changed) -> Part<'a> {
-        let (k, v) = (&self.kernels, &self.volumes);
-        let all = [Access::StorageRead, Access::StorageWrite];
-        Part::short(stages::CARVE, move |rec| {
-            on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks)?;
-            k.carve.record(
-                rec,
-                &on.field,
-                on.setup.anti_aliasing,
-                changed.opacities,
-                carve::Bindings {
-                    transfer: &on.transfer_buffer,
-                    clips: &on.clip_set,
-                    clip_bricks: &v.clip_bricks,
-                    clip_bricks_before: &v.clip_bricks_before,
-                    occupancy: &on.occupancy,
-                    contact: &v.contact,
-                    change: &v.change,
-                    list: &v.list,
-                    opacity: &v.opacity,
-                },
-            )?;
-            rec.barrier(&all, &[Access::StorageRead, Access::StorageWrite, Access::SampledRead]);
-            Ok(())
-        })
-    }
-
-    /// The table of rays.
-    fn directions<'a>(&'a self) -> Part<'a> {
-        Part::short(stages::DIRECTIONS, |rec| Ok(self.kernels.rays.record_directions(rec, &self.plan)?))
-    }
-
-    /// From changed bricks to those to compute: all that need values if `anew`, whatever there was before.
-    fn choose<'a>(&'a self, to: Target<'a>, anew: bool) -> Part<'a> {
-        let (k, v) = (&self.kernels, &self.volumes);
-        Part::short(stages::CHOOSE, move |rec| {
-            if anew {
-                rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
-                rec.fill(&v.change, 0, v.change.bytes(), 0)?;
-                rec.fill(to.todo, 0, to.todo.bytes(), 0)?;
-                rec.clear_image(to.ambient, [1.0; 4])?;
-                rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-            }
-            let bindings = near::Bindings {
-                change: &v.change,
-                other: &v.other,
-                contact: &v.contact,
-                todo: to.todo,
-                list: to.list,
-            };
-            Ok(k.near.record(rec, &to.on.field, to.on.setup.scope, self.plan.reach_mm, bindings)?)
-        })
-    }
-
-    /// Rays of the chosen bricks.
-    fn trace<'a>(&'a self, to: Target<'a>) -> Part<'a> {
-        let (k, v, plan) = (&self.kernels, &self.volumes, &self.plan);
-        let on = to.on;
-        // The first slice is small enough for any device.
-        let first = (4e6 / plan.brick_samples()).clamp(1.0, 1e6) as u32;
-        Part::items(stages::RAYS, to.list.items(&on.field), first, move |rec, take| {
-            let b = Bindings { opacity: &v.opacity, list: to.list, ambient: to.ambient };
-            let (field, reference_mm, scope) = (&on.field, on.ambient_mm, on.setup.scope);
-            k.rays.record(rec, field, plan, reference_mm, scope, b, take)?;
-            rec.barrier(
-                &[Access::SampledRead, Access::StorageRead, Access::StorageWrite],
-                &[Access::SampledRead, Access::StorageWrite, Access::TransferWrite],
-            );
-            Ok(())
-        })
-    }
-}
-
-impl Ambient for Traced {
     fn set(&mut self, on: &Subject) -> Result<()> {
         self.plan = RayPlan::new(on.field.spacing, &on.setup.occlusion)?;
         Ok(())
@@ -207,60 +33,23 @@ impl Ambient for Traced {
         Ok(())
     }
 
-    fn update<'a>(&'a self, on: &'a Subject, changed: Changed, into: Option<&'a Image>) -> Vec<Part<'a>> {
-        let v = &self.volumes;
-        let to = Target { on, todo: &v.todo, list: &v.list, ambient: into.unwrap_or(&v.ambient) };
-        let mut parts = Vec::new();
-        if changed.anew {
-            parts.push(self.directions());
-        }
-        parts.extend([self.carve(on, changed), self.choose(to, changed.anew), self.trace(to)]);
-        parts
+    fn reach_mm(&self) -> f32 {
+        self.plan.reach_mm
     }
 
-    fn clips<'a>(&'a self, on: &'a Subject) -> Part<'a> {
-        let (k, v) = (&self.kernels, &self.volumes);
-        Part::short(stages::CLIPS, move |rec| on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks))
+    /// The table of rays.
+    fn settings<'a>(&'a self, _: &'a Subject) -> Option<Part<'a>> {
+        Some(Part::short(stages::DIRECTIONS, |rec| Ok(self.rays.record_directions(rec, &self.plan)?)))
     }
 
-    fn written(&self, changed: Changed) -> Written<'_> {
-        // Anew the others are ones again.
-        Written { list: &self.volumes.list, all: changed.anew }
+    fn stage(&self) -> (Stage, u32) {
+        // The first slice is small enough for any device.
+        (stages::RAYS, (4e6 / self.plan.brick_samples()).clamp(1.0, 1e6) as u32)
     }
 
-    fn fields(&self) -> Fields<'_> {
-        let v = &self.volumes;
-        Fields { opacity: &v.opacity, ambient: &v.ambient, clip_bricks: &v.clip_bricks }
-    }
-
-    fn recompute(
-        &self,
-        on: &Subject,
-        into: &Image,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<(Recomputation<'_>, Timings)> {
-        let v = &self.volumes;
-        let list = BrickList::new(&on.gpu, &on.field)?;
-        let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
-        let to = Target { on, todo: &todo, list: &list, ambient: into };
-        let parts = [self.choose(to, true), self.trace(to)];
-        let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
-        drop(parts);
-        Ok((Recomputation { list, recomputed: Recomputed::Bricks(&v.todo) }, timings))
-    }
-
-    /// Tells recomputed bricks from others only, and nothing as clipped.
-    fn mask(&self, on: &Subject) -> Result<Vec<u8>> {
-        let todo: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&on.gpu, &self.volumes.todo)?);
-        let ([x, y, z], [bx, by, _]) = (on.field.dims, on.field.bricks());
-        let mut mask = Vec::with_capacity(x as usize * y as usize * z as usize);
-        for k in 0..z {
-            for j in 0..y {
-                let row = (k / BRICK * by + j / BRICK) * bx;
-                let done = |i: u32| todo[(row + i / BRICK) as usize] & TODO != 0;
-                mask.extend((0..x).map(|i| if done(i) { AFFECTED as u8 } else { UNTOUCHED as u8 }));
-            }
-        }
-        Ok(mask)
+    fn record(&self, rec: &mut Recorder, to: &Target, take: &Take) -> Result<()> {
+        let b = Bindings { opacity: to.opacity, list: to.list, ambient: to.ambient };
+        let (field, scope) = (&to.on.field, to.on.setup.scope);
+        Ok(self.rays.record(rec, field, &self.plan, to.on.ambient_mm, scope, b, take)?)
     }
 }

@@ -43,8 +43,8 @@ pub fn plan(
         planner::calibrate(renderer, &candidates, Some(budget), &mut |done| progress.set(done))?;
     let chosen = calibration.choose(budget)?;
     let seconds = start.elapsed().as_secs_f64();
-    let planner::Candidate { method, occlusion } = chosen.candidate;
-    renderer.set_setup(Setup { method, occlusion, ..setup })?;
+    let planner::Candidate { method, occlusion, options } = chosen.candidate;
+    renderer.set_setup(Setup { method, occlusion, options, ..setup })?;
     Ok(Some(Planned {
         budget,
         chosen,

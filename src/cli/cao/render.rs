@@ -12,6 +12,7 @@ use cao_model::error::shown_path;
 use cao_model::fit::{Fit, Fitting};
 use cao_model::frame::Turn;
 use cao_model::methods::Method;
+use cao_model::options::Options;
 use cao_model::view::StereoRig;
 use clap::ArgMatches;
 use glam::Vec3;
@@ -132,16 +133,17 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     });
     if method != o.method {
         // What the scene left to its method is left to this one.
-        if o.rays == o.method.rays() {
+        if o.rays == o.method.rays() || !method.follows(o.rays) {
             o.rays = method.rays();
         }
-        (o.method, o.quadrature) = (method, method.quadrature());
+        (o.method, o.quadrature, o.options) = (method, method.quadrature(), Options::DEFAULT);
     }
     o.rays = s.rays.unwrap_or(o.rays);
     o.quadrature = s.quadrature.unwrap_or(o.quadrature);
     o.radius_mm = s.radius_mm.or(o.radius_mm);
     o.offset_mm = s.offset_mm.or(o.offset_mm);
     o.step_mm = s.step_mm.or(o.step_mm);
+    o.options = s.options(o.options)?;
     scene.clips.extend(args::clips(matches)?);
     if let Some([width, height]) = args.size {
         (scene.image.width, scene.image.height) = (width, height);

@@ -62,6 +62,9 @@ impl Way {
         if !setup.method.has(setup.occlusion.quadrature) {
             setup.occlusion.quadrature = setup.method.quadrature();
         }
+        if !setup.method.follows(setup.occlusion.rays) {
+            setup.occlusion.rays = setup.method.rays();
+        }
         setup
     }
 
@@ -101,7 +104,7 @@ mod tests {
             setup.occlusion.quadrature = shared;
             for way in Way::all() {
                 let own = way.setup(setup);
-                assert!(own.method.has(own.occlusion.quadrature), "{way} {shared:?}");
+                own.check(1.0).unwrap_or_else(|error| panic!("{way} {shared:?}: {error}"));
             }
         }
     }

@@ -3,6 +3,7 @@
 use super::{Asked, Entrant, Setting, rendered};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::options::Options;
 use cao_model::settings::Setup;
 
 /// What the chart has to know of a method beside its entry.
@@ -28,15 +29,21 @@ impl Listed {
             rules.drain(1..rules.len() - 1);
         }
         let own = Setup::of(self.method, asked.min_spacing);
-        let settings = rules.iter().flat_map(|&quadrature| {
+        let rays = rules.iter().flat_map(|&quadrature| {
             sets.iter().map(move |&rays| Occlusion { rays, quadrature, ..own.occlusion })
         });
-        settings.map(|occlusion| self.entrant(name, Setup { occlusion, ..own }, asked)).collect()
+        let settings = rays.flat_map(|occlusion| {
+            self.method.variants().map(move |options| Setup { occlusion, options, ..own })
+        });
+        settings.map(|setup| self.entrant(name, setup, asked)).collect()
     }
 
     fn entrant(&self, name: &'static str, setup: Setup, asked: &Asked) -> Entrant {
         let occlusion = &setup.occlusion;
-        let setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
+        let mut setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
+        for (option, value) in setup.options.other_than(&Options::DEFAULT) {
+            setting.label += &format!(" {option} {value}");
+        }
         rendered::entrant(name, setup, setting, self.ray * occlusion.rays.count() as f64)
     }
 }
