@@ -15,6 +15,7 @@ use crate::clip::clip_bricks::ClipBricks;
 use crate::drive::{self, Pace, Part, Take};
 use crate::field::bricks::BrickList;
 use crate::field::near::{self, FAR, Near, TODO};
+use crate::field::ones::Ones;
 use crate::field::{BRICK, Field, volume_image};
 use crate::host::read_buffer;
 use crate::stages;
@@ -142,12 +143,18 @@ struct Kernels {
     clip_bricks: ClipBricks,
     carve: Carve,
     near: Near,
+    ones: Ones,
 }
 
 impl Kernels {
     /// Builds the pipelines. Uses the device's queue and waits for it.
     fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { clip_bricks: ClipBricks::new(gpu)?, carve: Carve::new(gpu)?, near: Near::new(gpu)? })
+        Ok(Self {
+            clip_bricks: ClipBricks::new(gpu)?,
+            carve: Carve::new(gpu)?,
+            near: Near::new(gpu)?,
+            ones: Ones::new(gpu)?,
+        })
     }
 }
 
@@ -209,11 +216,12 @@ impl<G: Gather> ByBrick<G> {
         let (k, v) = (&self.kernels, &self.volumes);
         Part::short(stages::CHOOSE, move |rec| {
             if anew {
-                rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::TransferWrite]);
+                let written = [Access::StorageRead, Access::StorageWrite];
+                rec.barrier(&written, &[Access::TransferWrite, Access::StorageWrite]);
                 rec.fill(&v.change, 0, v.change.bytes(), 0)?;
                 rec.fill(todo, 0, todo.bytes(), 0)?;
-                rec.clear_image(to.ambient, [1.0; 4])?;
-                rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
+                k.ones.record(rec, to.ambient)?;
+                rec.barrier(&[Access::TransferWrite, Access::StorageWrite], &written);
             }
             let bindings = near::Bindings {
                 change: &v.change,

@@ -572,9 +572,10 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 6] = [
+const WITHOUT_TWIN: [(&str, &str); 7] = [
     ("filter", "asks a device what its filter does; the answer is in the comparison"),
     ("commit", "counts and copies bricks; the test has what whole updates make of them"),
+    ("ones", "writes ones; the test has them"),
     ("present", "copies texels; the test has what each format makes of them"),
     ("scene_depth", "inverts a view's depth; the test has a sphere that it traces"),
     ("compare", "counts differing bits of two volumes; tests plant differences and count them"),

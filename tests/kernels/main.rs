@@ -13,6 +13,7 @@ mod filter;
 mod lao;
 mod near;
 mod occupancy;
+mod ones;
 mod opacity;
 mod pairs;
 mod peel;

@@ -17,7 +17,7 @@ use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
 use cao::renderer::{COLOUR, Renderer, StereoImage, Target, Targets};
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
+use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse};
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
@@ -797,6 +797,15 @@ fn a_ray_that_ends_early_changes_no_pixel_by_more_than_half_a_level() {
     close(gpu);
 }
 
+/// Levels that a picture of bytes may differ from that of floats by, and the share of pixels that may differ by more than one: filters of
+/// GPUs round what they interpolate in another way for each format, and where a mask rises from 0 to 255 in a voxel that moves its surface.
+fn by_filter(gpu: &Gpu) -> (f32, f32) {
+    match gpu.info().kind {
+        DeviceKind::Cpu => (1.0, 0.0),
+        _ => (8.0, 0.01),
+    }
+}
+
 /// Masks, few labels, everything that 8 bits hold: the same numbers in bytes and in floats.
 #[test]
 fn pictures_do_not_depend_on_the_type_that_values_are_stored_in() {
@@ -820,12 +829,18 @@ fn pictures_do_not_depend_on_the_type_that_values_are_stored_in() {
                 floats.iter().filter(|c| c[3] > 0.5).count() > floats.len() / 20,
                 "{name}: nothing shows"
             );
-            for (f, b) in floats.iter().zip(&bytes) {
-                for i in 0..3 {
-                    let off = (level(f[i], f[3], 0.5) - level(b[i], b[3], 0.5)).abs();
-                    assert!(off <= 1.0, "{name}: {b:?} in bytes, {f:?} in floats");
-                }
-            }
+            let off = |(f, b): (&[f32; 4], &[f32; 4])| {
+                let off = |i: usize| (level(f[i], f[3], 0.5) - level(b[i], b[3], 0.5)).abs();
+                off(0).max(off(1)).max(off(2))
+            };
+            let off: Vec<f32> = floats.iter().zip(&bytes).map(off).collect();
+            let worst = off.iter().copied().fold(0.0, f32::max);
+            let beyond = off.iter().filter(|off| **off > 1.0).count();
+            let (most, few) = by_filter(&gpu);
+            assert!(
+                worst <= most && beyond as f32 <= few * off.len() as f32,
+                "{name}: {worst} levels between bytes and floats, {beyond} pixels beyond 1"
+            );
         }
     }
     close(gpu);

@@ -82,8 +82,8 @@ fn local<'a>(
     [bricks, rays]: [Stage; 2],
 ) -> [Part<'a>; 2] {
     let listed = Part::short(bricks, move |rec| {
-        rec.clear_image(to, [1.0; 4])?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageWrite]);
+        k.ones.record(rec, to)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageWrite]);
         let which = match on.setup.scope {
             Scope::All => Which::All,
             Scope::Needed => Which::Needed,

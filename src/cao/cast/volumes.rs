@@ -6,6 +6,7 @@ use crate::clip::classify::Classify;
 use crate::clip::clip_bricks::ClipBricks;
 use crate::field::Field;
 use crate::field::bricks::{BrickList, Bricks};
+use crate::field::ones::Ones;
 use crate::field::opacity::Opacity;
 use crate::field::volume_image;
 use crate::host::{read_buffer, read_texels};
@@ -75,6 +76,8 @@ pub struct Kernels {
     pub classify: Classify,
     /// Compaction.
     pub bricks: Bricks,
+    /// What nothing is computed for.
+    pub ones: Ones,
     /// Stages 1 and 5.
     pub lao: Lao,
 }
@@ -87,6 +90,7 @@ impl Kernels {
             clip_bricks: ClipBricks::new(gpu)?,
             classify: Classify::new(gpu)?,
             bricks: Bricks::new(gpu)?,
+            ones: Ones::new(gpu)?,
             lao: Lao::new(gpu)?,
         })
     }

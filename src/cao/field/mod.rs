@@ -8,6 +8,7 @@ pub mod bricks;
 pub mod commit;
 pub mod near;
 pub mod occupancy;
+pub mod ones;
 pub mod opacity;
 pub mod transfer;
 
