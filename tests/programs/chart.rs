@@ -4,7 +4,7 @@ use crate::support::Folder;
 use cao::renderer::{COLOUR, Renderer};
 use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, measure, report};
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, foresee, looks_draw, measure, report};
 use cao_measure::contender::{BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
@@ -16,9 +16,12 @@ use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_testing::{close, open};
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 const METHODS: [&str; 7] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO", "rays"];
 const RUNS: u32 = 2;
+/// How far off foreseen minutes may be.
+const FORESEEN: f64 = 8.0;
 
 fn scene(name: &str) -> Scene {
     let volume = builtin(name, 18).unwrap();
@@ -39,8 +42,19 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     let gpu = open();
     let mut shares = Vec::new();
     let scenes = [scene("engine"), scene("fruit")];
+    let foreseen = foresee(&gpu, &scenes, &plan()).unwrap();
+    let start = Instant::now();
     let chart = measure(&gpu, &scenes, &plan(), &mut |_, share| shares.push(share)).unwrap();
+    let minutes = start.elapsed().as_secs_f64() / 60.0;
     close(gpu);
+    // Machines do other things meanwhile, and small scenes have more of everything that is not counted.
+    let off = foreseen.minutes / minutes;
+    assert!(
+        (1.0 / FORESEEN..FORESEEN).contains(&off),
+        "{} minutes foreseen, {minutes} taken",
+        foreseen.minutes
+    );
+    assert!(foreseen.device_bytes >= scenes[0].volume.len() as u64 * 24, "{foreseen:?}");
     assert!(shares.is_sorted() && *shares.last().unwrap() <= 1.0, "{shares:?}");
     assert!(shares.last().unwrap() > &0.8, "work that nobody counted: {shares:?}");
 

@@ -43,6 +43,15 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let plan = plan(args);
+    if !args.quick {
+        let foreseen = chart::foresee(&gpu, &scenes, &plan)?;
+        cao_cli::say(&format!(
+            "measuring will take some {:.0} minutes on this machine, give or take half, and up to {:.0} MiB of the device's memory; \
+             --quick takes two minutes",
+            foreseen.minutes.ceil(),
+            foreseen.device_bytes as f64 / f64::from(1 << 20)
+        ));
+    }
     progress.stage("measuring");
     let chart = chart::measure(&gpu, &scenes, &plan, &mut |what, share| {
         progress.say(what);

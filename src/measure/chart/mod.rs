@@ -37,6 +37,7 @@ use glam::{Vec2, Vec3};
 use looks::Looks;
 use pictures::Shown;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// How much is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -248,6 +249,37 @@ fn group(scene: &Scene) -> usize {
 const SURFACE: usize = 1000;
 /// Points of the surface in a picture of errors; and for a first look.
 const PICTURED: [usize; 2] = [6000, 2000];
+
+/// What measuring will take, roughly.
+#[derive(Clone, Copy, Debug)]
+pub struct Foreseen {
+    /// Minutes of this machine: times of other work are known within a factor of two or so.
+    pub minutes: f64,
+    /// Memory of the device in bytes, the drivers' own aside.
+    pub device_bytes: u64,
+}
+
+/// What [`measure`] will take, by the time of two updates of the baseline in the smallest scene. Uses the device's queue and waits for it.
+pub fn foresee(gpu: &Gpu, scenes: &[Scene], plan: &Plan) -> Result<Foreseen> {
+    let Some(scene) = scenes.iter().min_by_key(|scene| scene.volume.len()) else {
+        return Ok(Foreseen { minutes: 0.0, device_bytes: 0 });
+    };
+    let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
+    let entries = contender::all(&asked);
+    let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting)).ok_or_else(no_baseline)?;
+    let views = scene.views(plan.size)?;
+    let arena = Arena { gpu, volume: &scene.volume, views: &views, size: plan.size };
+    let mut contender = (baseline.open)(arena, &scene.state)?;
+    contender.update(Change::Volume, &scene.state)?;
+    let start = Instant::now();
+    contender.update(Change::Volume, &scene.state)?;
+    let seconds = start.elapsed().as_secs_f64() / Work::update(scene, baseline);
+    let work: f64 = scenes.iter().map(|scene| Work::of(scene, plan)).sum();
+    let largest = scenes
+        .iter()
+        .map(|scene| (VOXEL * scene.volume.len() * (group(scene) + 1).min(entries.len())) as u64);
+    Ok(Foreseen { minutes: seconds * work / 60.0, device_bytes: largest.max().unwrap_or(0) })
+}
 
 /// Measures. `progress` hears what is being done and the share of the whole that is done.
 pub fn measure(
