@@ -32,6 +32,10 @@ pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
 pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
 /// Rays of these bricks.
 pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
+/// Which bricks have other features.
+pub const LABELS: Stage = Stage::new("labels", Phase::Ambient);
+/// Rays of features of the bricks within reach of a change.
+pub const FDAO: Stage = Stage::new("fdao", Phase::Ambient);
 /// What a build made of several frames is shown.
 pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 /// How far rays of the picture may leap.
