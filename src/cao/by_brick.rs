@@ -193,13 +193,15 @@ impl<G: Gather> ByBrick<G> {
         let all = [Access::StorageRead, Access::StorageWrite];
         Part::short(stages::CARVE, move |rec| {
             on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks)?;
+            let (field, transfer) = on.opacities();
             k.carve.record(
                 rec,
-                &on.field,
+                field,
                 on.setup.anti_aliasing,
                 changed.opacities,
                 carve::Bindings {
-                    transfer: &on.transfer_buffer,
+                    transfer,
+                    features: &on.features,
                     clips: &on.clip_set,
                     clip_bricks: &v.clip_bricks,
                     clip_bricks_before: &v.clip_bricks_before,

@@ -12,6 +12,8 @@ pub const DIRECTIONS: Stage = Stage::new("directions", Phase::Prepare);
 pub const PRECOMPUTE_BRICKS: Stage = Stage::new("precompute bricks", Phase::Prepare);
 /// V_PAO.
 pub const PRECOMPUTE: Stage = Stage::new("precompute lao", Phase::Prepare);
+/// Opacities after features.
+pub const FEATURES: Stage = Stage::new("features", Phase::Opacity);
 /// Which bricks can have opacity.
 pub const OCCUPANCY: Stage = Stage::new("occupancy", Phase::Opacity);
 /// V_o before clipping.

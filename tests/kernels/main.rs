@@ -9,6 +9,7 @@ mod clip_bricks;
 mod clipping;
 mod dilate;
 mod extent;
+mod features;
 mod filter;
 mod lao;
 mod near;
