@@ -37,6 +37,7 @@ struct Rays {
 }
 
 #include "shared/bricks.wgsl"
+#include "shared/features.wgsl"
 #include "shared/whole_rays.wgsl"
 
 var<immediate> params: FdaoParams;
@@ -46,7 +47,7 @@ var<immediate> params: FdaoParams;
 @group(0) @binding(2) var<storage, read> directions: Directions;
 @group(0) @binding(3) var<storage, read> cells: Cells;
 @group(0) @binding(4) var<storage, read> list: BrickList;
-// feature of each voxel, 1 ... 8, 0 where it has none
+// feature of each voxel, 1 ... MOST_FEATURES, 0 where it has none
 @group(0) @binding(5) var labels: texture_3d<u32>;
 // of `CHANNELS` A_k in channel k - 1; of the other rules the voxel's value in all
 @group(0) @binding(6) var ambient: texture_storage_3d<rgba16unorm, write>;
@@ -73,7 +74,7 @@ const BOX = BRICK + 2u * MARGIN;
 // Codes in a word.
 const CODES = 8u;
 // Code of opacity without a feature; 0 is that of none, and other codes are features.
-const OTHER = 9u;
+const OTHER = MOST_FEATURES + 1u;
 
 // Codes of the voxels around, a row in two words, y + BOX z.
 var<workgroup> codes: array<u32, BOX * BOX * BOX / CODES>;

@@ -58,15 +58,10 @@ pub static METHODS: &[Entry] = &[
         source: "fdAO §4, eq. (5), (6)",
         rays: RaySet::Spiral(50),
         quadratures: &Quadrature::BRICK,
-        sets: &[
-            RaySet::Spiral(14),
-            RaySet::Spiral(26),
-            RaySet::Spiral(50),
-            RaySet::Spiral(96),
-            RaySet::Spiral(192),
-        ],
+        // Where there are no features its values are those of `rays`, whatever the option.
+        sets: &[RaySet::Spiral(50)],
         options: &["combine"],
-        variants: &[&[], &[("combine", "own")], &[("combine", "neighbours")], &[("combine", "max")]],
+        variants: &[&[]],
         contextual: true,
         same_values_as: Method::FeatureDriven,
     },

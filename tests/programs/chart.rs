@@ -17,7 +17,8 @@ use cao_model::view::StereoRig;
 use cao_testing::{close, open};
 use std::collections::BTreeMap;
 
-const METHODS: [&str; 7] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO", "rays"];
+const METHODS: [&str; 8] =
+    ["solid colour", "image space", BASELINE, "fdAO", "LAO", "CAO literal", "CAO", "rays"];
 const RUNS: u32 = 2;
 
 fn scene(name: &str) -> Scene {
