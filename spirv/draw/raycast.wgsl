@@ -2,6 +2,10 @@
 // through which the value is taken as linear and its opacity integrated exactly; steps halve where a segment's opacity says little of its
 // parts. Leaps over bricks that show nothing, clipped parts skipped by the shadow test of section 3.2, ambient factor from V_AO in front of
 // where a segment's light comes from.
+//
+// With features, `featured`, the volume is that of opacities after features and the transfer function says that its values are opacities, so
+// that voxels are classified first and interpolated then (`features.wgsl`). Colours are those of features, and where a clip hides a place,
+// what of it belongs to a feature that clips leave whole is there all the same.
 
 #include "shared/transfer.wgsl"
 
@@ -14,6 +18,10 @@
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 @group(0) @binding(2) var<storage, read> bounds: Bounds;
+// with features only: the values of the volume, which voxel is whose, and how that is shown
+@group(0) @binding(13) var values: texture_3d<f32>;
+@group(0) @binding(14) var feature_index: texture_3d<u32>;
+@group(0) @binding(15) var<uniform> features: Features;
 
 // a layer a view: premultiplied, linear; depth by the view's planes, and before where rays end, see `ended`
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
@@ -71,8 +79,20 @@ const MOST_LIT = 0.125;
 // of its ends.
 const MOST_CHANGE = 0.125;
 
+// Whether clips hide the place that is looked at, so that only what they leave whole counts.
+var<private> only_spared = false;
+
 fn texel_at(x: i32, y: i32, z: i32) -> f32 {
-    return textureLoad(volume, vec3(x, y, z), 0).r;
+    let texel = textureLoad(volume, vec3(x, y, z), 0).r;
+    if only_spared && !is_spared(vec3<u32>(vec3(x, y, z))) {
+        return 0.0;
+    }
+    return texel;
+}
+
+// Whether texels are interpolated here.
+fn by_hand() -> bool {
+    return params.by_hand == 1u || only_spared;
 }
 
 // What a filter should give.
@@ -97,7 +117,7 @@ fn interpolated(position: vec3<f32>) -> f32 {
 
 fn value_at(position: vec3<f32>) -> f32 {
     var texel = 0.0;
-    if params.by_hand == 1u {
+    if by_hand() {
         texel = interpolated(position);
     } else {
         texel = textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r;
@@ -106,6 +126,8 @@ fn value_at(position: vec3<f32>) -> f32 {
 }
 
 #include "shared/shading.wgsl"
+#include "shared/feature_colour.wgsl"
+#include "shared/spared.wgsl"
 
 // Whether the rest of a ray's light cannot change a pixel of the picture by more than the frame's tolerance. It adds at most its share of
 // the brightest light to a component, or takes as much of a background; sRGB coding spreads that by its slope, which is largest at the
@@ -205,6 +227,15 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
     return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
 }
 
+// Two segments one behind the other as one, the first of which has a share of the length.
+fn joined(a: Segment, b: Segment, share: f32) -> Segment {
+    let behind = (1.0 - a.alpha) * b.alpha;
+    let alpha = a.alpha + behind;
+    let colour = a.colour + (1.0 - a.alpha) * b.colour;
+    let centre = a.alpha * a.centre * share + behind * mix(share, 1.0, b.centre);
+    return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
+}
+
 // Whether a step has to be halved, through which `open` of the light comes to the eye: its opacity is not that of its ends, because a
 // surface is in it, and matters.
 fn varies(found: Segment, near: Sample, far: Sample, length: f32, open: f32) -> bool {
@@ -245,8 +276,17 @@ fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
     return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
 }
 
-// What an eye sees at a place in pixels, up to a view depth.
-fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
+// Of a segment of a volume with features: opacities from near to far, between two depths.
+fn segment_of_features(near: f32, far: f32, begin: f32, end: f32, start: vec3<f32>, along: vec3<f32>, per_depth: f32) -> Segment {
+    var found = segment(sample_of(near), sample_of(far), (end - begin) * per_depth);
+    if found.alpha > 0.0 {
+        found.colour = found.alpha * colour_at(start + mix(begin, end, found.centre) * along);
+    }
+    return found;
+}
+
+// What an eye sees at a place in pixels, up to a view depth. `featured`: of a volume with features.
+fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
@@ -256,6 +296,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     // Parts of a stretch: whole steps, so that rounding does not decide.
     let stretch = PARTS * u32(clamp(smallest_spacing() / frame.spacing.w + 0.01, 1.0, STEPS_LIT));
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
+    // Whether something of what clips hide is there all the same.
+    let spares = featured && features.any_spared == 1u;
 
     var colour = vec3(0.0);
     var alpha = 0.0;
@@ -326,6 +368,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                 var far = next;
                 var shows = true;
                 var shown_to = true;
+                // At a cut: depths on its two sides, the hidden one first.
+                var sides = vec2(t);
                 if clips.count > 0u {
                     // A place is asked once, though two segments meet there.
                     if asked_n != n {
@@ -335,7 +379,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                     shows = shown_from || shown_to;
                     if shown_from != shown_to {
                         // Only the part on one side of the cut shows.
-                        let sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
+                        sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
                         let at_cut = value_at(start + sides.y * along);
                         if shown_to {
                             t_from = sides.y;
@@ -348,12 +392,52 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                         }
                     }
                 }
-                if shows {
-                    let from_sample = sample_of(near);
-                    let to_sample = sample_of(far);
+                // Of what clips hide only what they leave whole counts.
+                let halves = shown_from != shown_to && clips.count > 0u;
+                var kept = Segment(0.0, vec3(0.0), 0.0);
+                var kept_end = 0.0;
+                if spares && clips.count > 0u && !(shown_from && shown_to) {
+                    only_spared = true;
+                    let t_first = select(t, sides.x, halves && shown_from);
+                    let t_last = select(t_next, sides.x, halves && shown_to);
+                    let first_value = value_at(start + t_first * along);
+                    let last_value = value_at(start + t_last * along);
+                    kept = segment_of_features(first_value, last_value, t_first, t_last, start, along, slant / frame.light.w);
+                    only_spared = false;
+                    kept_end = select(first_value, last_value, shown_from);
+                    if !halves {
+                        near = first_value;
+                        far = last_value;
+                    }
+                }
+                if shows || kept.alpha > 0.0 {
+                    var from_sample = sample_of(near);
+                    var to_sample = sample_of(far);
                     // in reference lengths
-                    let length = (t_to - t_from) * slant / frame.light.w;
-                    let found = segment(from_sample, to_sample, length);
+                    var length = (t_to - t_from) * slant / frame.light.w;
+                    var found = segment(from_sample, to_sample, length);
+                    if featured {
+                        if shows {
+                            found = segment_of_features(near, far, t_from, t_to, start, along, slant / frame.light.w);
+                        } else {
+                            found = kept;
+                        }
+                        if spares && halves {
+                            let share = (sides.x - t) / (t_next - t);
+                            if shown_from {
+                                found = joined(found, kept, share);
+                                far = kept_end;
+                            } else {
+                                found = joined(kept, found, share);
+                                near = kept_end;
+                            }
+                            t_from = t;
+                            t_to = t_next;
+                            from_sample = sample_of(near);
+                            to_sample = sample_of(far);
+                            length = (t_to - t_from) * slant / frame.light.w;
+                        }
+                    }
                     if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
                         size /= 2u;
                         asked_n = n;
@@ -382,15 +466,20 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
         // It is lit where its light comes from.
         let stops = 1.0 - open;
         let t_shown = centre.x / stops;
+        if spares && clips.count > 0u {
+            only_spared = !visible_to(asked_at(start + t_shown * along, bricks), eye.origin.xyz + t_shown * ray.direction);
+        }
         let at = Shown(
             start + t_shown * along,
             eye.origin.xyz + t_shown * ray.direction,
             centre.y / stops,
             tint / stops,
-            cut,
+            // What clips leave whole they do not cut.
+            select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,
         );
         colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
+        only_spared = false;
         alpha += (1.0 - alpha) * stops;
         if depth == nothing && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;
@@ -421,7 +510,7 @@ fn is_inside(texel: vec2<u32>) -> bool {
 }
 
 // The mean of a pixel's samples, and the depth of the one nearest to its centre.
-fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
+fn pixel_of(texel: vec2<u32>, view: u32, featured: bool) -> Pixel {
     let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
     var end = 3e38;
     if params.ended == 1u {
@@ -430,7 +519,7 @@ fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
     var mean = Pixel(vec4(0.0), 1.0);
     for (var i = 0u; i < frame.samples; i++) {
         let pair = frame.places[i / 2u];
-        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end);
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end, featured);
         mean.colour += frame.share * one.colour;
         if i == 0u {
             mean.depth = one.depth;
@@ -443,7 +532,7 @@ fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     let texel = texel_of(group, local.xy);
     if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z);
+        let pixel = pixel_of(texel, group.z, false);
         textureStore(colours, texel, group.z, pixel.colour);
         textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
     }
@@ -453,7 +542,27 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) l
 fn half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     let texel = texel_of(group, local.xy);
     if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z);
+        let pixel = pixel_of(texel, group.z, false);
+        textureStore(half_colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z, true);
+        textureStore(colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured_half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z, true);
         textureStore(half_colours, texel, group.z, pixel.colour);
         textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
     }

@@ -193,7 +193,8 @@ impl Renderer {
         let written = self.subject.field.overwrite(&self.subject.gpu, first, values);
         // Values that are refused change nothing; where the device fails some may be there.
         if !matches!(written, Err(Error::Model(_))) {
-            self.edited(Changed { opacities: true, ..Changed::NOTHING });
+            let features = self.subject.features.follow_values();
+            self.edited(Changed { opacities: true, features, ..Changed::NOTHING });
         }
         written
     }

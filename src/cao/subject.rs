@@ -114,7 +114,7 @@ impl Subject {
         });
         let occupancy = Part::short(stages::OCCUPANCY, |rec| {
             let (field, transfer) = self.opacities();
-            self.occupancy_kernel.record(rec, field, transfer, &self.occupancy)?;
+            self.occupancy_kernel.record(rec, field, transfer, &self.features, &self.occupancy)?;
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
             Ok(())
         });

@@ -98,6 +98,11 @@ impl FeatureSet {
         self.features = features;
     }
 
+    /// Whether which voxel is whose depends on values.
+    pub fn follow_values(&self) -> bool {
+        !self.features.is_empty() && matches!(self.features.voxels, Voxels::Intervals(_))
+    }
+
     /// V_f as a volume and its transfer function, where there are features.
     pub fn opacities(&self) -> Option<(&Field, &TransferBuffer)> {
         self.classified.as_ref().map(|(field, transfer)| (field, transfer))
