@@ -57,7 +57,7 @@ pub trait Gather: Send + Sync + Sized {
         None
     }
 
-    /// Notes bricks in which what values depend on beside opacities changed, with 0 in `change`, after edits of opacities.
+    /// Notes bricks in which what values depend on beside opacities changed, with 0 in `change`, after edits of features.
     fn changed<'a>(&'a self, on: &'a Subject, change: &'a Buffer) -> Option<Part<'a>> {
         let _ = (on, change);
         None
@@ -270,7 +270,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
             parts.extend(self.gather.settings(on));
         }
         parts.push(self.carve(on, changed));
-        if changed.opacities {
+        if changed.features {
             parts.extend(self.gather.changed(on, &v.change));
         }
         parts.extend(self.gather.prepare(on, &v.opacity));
