@@ -9,6 +9,7 @@ mod clip_bricks;
 mod clipping;
 mod dilate;
 mod extent;
+mod feature_colour;
 mod features;
 mod filter;
 mod lao;
