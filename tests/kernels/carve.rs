@@ -100,7 +100,7 @@ impl<'a> Bench<'a> {
             if let Some(transfer) = transfer {
                 self.transfer.record(rec, transfer).unwrap();
                 self.features.record(rec, classes, &self.field, transfer, &self.transfer).unwrap();
-                occupancy.record(rec, field, by, &self.occupancy).unwrap();
+                occupancy.record(rec, field, by, &self.features, &self.occupancy).unwrap();
             }
             opacity.record(rec, field, by, &self.full).unwrap();
             self.set.record(rec, clips, self.half_mm).unwrap();

@@ -10,6 +10,7 @@ mod clipping;
 mod dilate;
 mod extent;
 mod fdao;
+mod feature_colour;
 mod features;
 mod filter;
 mod labels;
