@@ -49,6 +49,8 @@ struct RaycastParams {
     tiles: u32,
     // 1: `depths` holds at which depth in mm a pixel's rays end at the latest
     ended: u32,
+    // 1: V_AO has the values of features side by side
+    channels: u32,
 }
 
 struct Pixel {
@@ -478,6 +480,11 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
             select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,
         );
+        if featured && params.channels == 1u {
+            // Of no feature: whatever is darkest there. With more features than channels all of them hold the same.
+            let feature = owner_of(at.position).feature;
+            channel = select((feature - 1u) % LEAST, LEAST, feature == 0u);
+        }
         colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
         only_spared = false;
         alpha += (1.0 - alpha) * stops;

@@ -12,7 +12,21 @@ fn source_at(x: i32, y: i32, z: i32) -> f32 {
     return textureLoad(values, vec3(x, y, z), 0).r;
 }
 
-fn colour_at(position: vec3<f32>) -> vec3<f32> {
+// Who has the most of a place's opacity, and the eight voxels round it.
+struct Owner {
+    feature: u32,
+    // lowest and highest voxel
+    l: vec3<i32>,
+    h: vec3<i32>,
+    // linear weights of four voxels of a slice, and of the upper slice
+    across: vec4<f32>,
+    up: f32,
+    // features of the voxels of both slices
+    low: vec4<u32>,
+    high: vec4<u32>,
+}
+
+fn owner_of(position: vec3<f32>) -> Owner {
     let last = frame.dims.xyz - 1.0;
     let at = clamp(position, vec3(0.0), last);
     let l = vec3<i32>(at);
@@ -34,12 +48,20 @@ fn colour_at(position: vec3<f32>) -> vec3<f32> {
             }
         }
     }
+    return Owner(own, l, h, across, w.z, low, high);
+}
+
+fn colour_at(position: vec3<f32>) -> vec3<f32> {
+    let owner = owner_of(position);
+    let own = owner.feature;
     let colour = features.each[own].colour;
     if colour.w == 1.0 {
         return colour.rgb;
     }
-    let below = (1.0 - w.z) * across * vec4<f32>(low == vec4(own));
-    let above = w.z * across * vec4<f32>(high == vec4(own));
+    let l = owner.l;
+    let h = owner.h;
+    let below = (1.0 - owner.up) * owner.across * vec4<f32>(owner.low == vec4(own));
+    let above = owner.up * owner.across * vec4<f32>(owner.high == vec4(own));
     let sum = dot(below, vec4(source_at(l.x, l.y, l.z), source_at(h.x, l.y, l.z), source_at(l.x, h.y, l.z), source_at(h.x, h.y, l.z)))
         + dot(above, vec4(source_at(l.x, l.y, h.z), source_at(h.x, l.y, h.z), source_at(l.x, h.y, h.z), source_at(h.x, h.y, h.z)));
     let weight = max(dot(below, vec4(1.0)) + dot(above, vec4(1.0)), 1e-30);
