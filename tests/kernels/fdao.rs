@@ -6,7 +6,7 @@ use cao::features::fdao::{self, Fdao, Rule};
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::volume_image;
-use cao::rays::rays::{self, RayPlan, Rays};
+use cao::rays::rays::{Bindings, RayPlan, Rays};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -28,7 +28,6 @@ const ROUNDED: u16 = 1;
 struct State {
     gpu: Gpu,
     kernel: Fdao,
-    rays: Rays,
     field: Field,
 }
 
@@ -44,8 +43,7 @@ struct Asked<'a> {
 impl State {
     fn new(grid: &Grid) -> Self {
         let gpu = open();
-        let (kernel, rays) = (Fdao::new(&gpu).unwrap(), Rays::new(&gpu).unwrap());
-        Self { kernel, rays, field: blank(&gpu, grid), gpu }
+        Self { kernel: Fdao::new(&gpu).unwrap(), field: blank(&gpu, grid), gpu }
     }
 
     fn image(&self, format: Format, content: &[u8]) -> Image {
@@ -75,23 +73,23 @@ impl State {
     }
 
     /// That of rays by brick.
-    fn of_all_matter(&self, plan: &RayPlan, asked: Asked) -> Vec<u16> {
+    fn of_all_matter(&self, rays: &Rays, plan: &RayPlan, asked: Asked) -> Vec<u16> {
         let voxels = self.field.dims.iter().product::<u32>() as usize;
         let ambient = self.image(Format::R16Unorm, bytemuck::cast_slice(&vec![7_u16; voxels]));
         let list = BrickList::of(&self.gpu, &self.all()).unwrap();
-        let b = rays::Bindings { opacity: asked.opacity, list: &list, ambient: &ambient };
+        let b = Bindings { opacity: asked.opacity, list: &list, ambient: &ambient };
         run(&self.gpu, |rec| {
-            self.rays.record_directions(rec, plan).unwrap();
+            rays.record_directions(rec, plan).unwrap();
             let (field, reference_mm) = (&self.field, asked.reference_mm);
-            self.rays.record(rec, field, plan, reference_mm, asked.scope, b, &Take::All).unwrap();
+            rays.record(rec, field, plan, reference_mm, asked.scope, b, &Take::All).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
         });
         bytemuck::pod_collect_to_vec(&read_image(&self.gpu, &ambient))
     }
 
     fn close(self) {
-        let Self { gpu, kernel, rays, field } = self;
-        drop((kernel, rays, field));
+        let Self { gpu, kernel, field } = self;
+        drop((kernel, field));
         close(gpu);
     }
 }
@@ -116,16 +114,14 @@ fn blobs(random: &mut Random, grid: &Grid, features: u8) -> (Vec<u16>, Vec<u8>) 
 #[test]
 fn every_rule_equals_its_twin_in_any_order() {
     let mut random = Random::new(22);
-    let extra = [
-        Grid { dims: [27, 21, 19], spacing: [1.0; 3] },
-        Grid { dims: [20, 18, 17], spacing: [1.0, 0.5, 0.8] },
-    ];
+    let extra = Grid { dims: [20, 18, 17], spacing: [1.0, 0.5, 0.8] };
     let (mut sum, mut count, mut mixed) = (0.0, 0.0, 0);
-    for (case, grid) in GRIDS.iter().chain(&extra).enumerate() {
-        let state = State::new(grid);
+    let mut state = State::new(&GRIDS[0]);
+    for (case, grid) in GRIDS.iter().chain([&extra]).enumerate() {
+        state.field = blank(&state.gpu, grid);
         for (turn, (rays_of, [radius, offset, step], reference, features)) in [
-            (RaySet::Spiral(14), [Some(9.0), None, None], 1.0, 3),
-            (RaySet::W14, [Some(5.0), None, None], 1.0, 8),
+            (RaySet::Spiral(10), [Some(7.0), None, None], 1.0, 3),
+            (RaySet::R6, [Some(5.0), None, None], 1.0, 8),
             (RaySet::Spiral(6), [Some(1.0), Some(0.0), None], 1.0, 4),
             (RaySet::R6, [Some(11.0), Some(0.2), Some(1.7)], 0.7, 2),
         ]
@@ -182,10 +178,10 @@ fn every_rule_equals_its_twin_in_any_order() {
                 );
             }
         }
-        state.close();
     }
+    state.close();
     assert!(sum / count < MEAN + 0.1 * 1.5 / 256.0, "mean {}", sum / count);
-    assert!(mixed > 1000, "features' values differ at {mixed} voxels only");
+    assert!(mixed > 500, "features' values differ at {mixed} voxels only");
 }
 
 /// Where all matter is of one feature every rule has the values of rays by brick, to the bit. Where it is of two it has not.
@@ -193,6 +189,7 @@ fn every_rule_equals_its_twin_in_any_order() {
 fn one_feature_has_the_values_of_rays_by_brick() {
     let grid = Grid { dims: [30, 22, 19], spacing: [0.9, 1.0, 1.3] };
     let state = State::new(&grid);
+    let rays = Rays::new(&state.gpu).unwrap();
     let (opacity, two) = blobs(&mut Random::new(4), &grid, 2);
     let opacity = state.image(Format::R16Unorm, bytemuck::cast_slice(&opacity));
     let one = state.image(Format::R8Uint, &vec![1; grid.len()]);
@@ -207,7 +204,7 @@ fn one_feature_has_the_values_of_rays_by_brick() {
         };
         let plan = RayPlan::new(state.field.spacing, &occlusion).unwrap();
         let asked = |labels| Asked { opacity: &opacity, labels, reference_mm: 1.1, scope: Scope::Needed };
-        let all = state.of_all_matter(&plan, asked(&one));
+        let all = state.of_all_matter(&rays, &plan, asked(&one));
         for combine in RULES {
             let least = |labels, features| -> Vec<u16> {
                 let found = state.computed(&plan, Rule::new(combine, features), asked(labels), &state.all());
@@ -217,6 +214,6 @@ fn one_feature_has_the_values_of_rays_by_brick() {
             assert_ne!(least(&two, 2), all, "{quadrature:?} {combine:?}");
         }
     }
-    drop((opacity, one, two));
+    drop((rays, opacity, one, two));
     state.close();
 }

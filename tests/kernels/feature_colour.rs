@@ -8,6 +8,7 @@ use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
 use cao_model::look::{Look, Shading};
+use cao_model::methods::Method;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::View;
@@ -179,7 +180,10 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let mut features = Features::by_intervals(vec![(Feature::new("core"), [160.0, 190.0])]).unwrap();
         renderer.set_features(features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();
-        assert!(state(&renderer) == before, "{}", method.name());
+        // Beside a feature other matter has none, which is all the same to all methods but one.
+        let own = method == Method::FeatureDriven;
+        assert!(own || state(&renderer) == before, "{}", method.name());
+        let before = state(&renderer);
         features.list[0].visible = false;
         renderer.set_features(features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();

@@ -130,6 +130,7 @@ impl Raycast {
             tiles: tiles.len() as u32,
             ended: u32::from(ended),
             channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm),
+            pad: Default::default(),
         };
         let [x, y, _] = row_of_groups(tiles.len() as u32);
         let groups = [x, y, picture.views() as u32];
