@@ -30,6 +30,7 @@
 @group(0) @binding(12) var half_colours: texture_storage_2d_array<rgba16float, write>;
 
 #include "shared/bounds.wgsl"
+#include "shared/spared.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
@@ -85,16 +86,7 @@ const MOST_CHANGE = 0.125;
 var<private> only_spared = false;
 
 fn texel_at(x: i32, y: i32, z: i32) -> f32 {
-    let texel = textureLoad(volume, vec3(x, y, z), 0).r;
-    if only_spared && !is_spared(vec3<u32>(vec3(x, y, z))) {
-        return 0.0;
-    }
-    return texel;
-}
-
-// Whether texels are interpolated here.
-fn by_hand() -> bool {
-    return params.by_hand == 1u || only_spared;
+    return textureLoad(volume, vec3(x, y, z), 0).r;
 }
 
 // What a filter should give.
@@ -117,9 +109,30 @@ fn interpolated(position: vec3<f32>) -> f32 {
     return mix(low, high, w.z);
 }
 
+// The same of a volume with features, of those voxels that clips leave whole.
+fn kept_at(position: vec3<f32>) -> f32 {
+    let last = frame.dims.xyz - 1.0;
+    let at = clamp(position, vec3(0.0), last);
+    let l = vec3<i32>(at);
+    let w = at - vec3<f32>(l);
+    var sum = 0.0;
+    for (var i = 0u; i < 8u; i++) {
+        let up = vec3(i & 1u, i >> 1u & 1u, i >> 2u) == vec3(1u);
+        let voxel = min(l + select(vec3(0), vec3(1), up), vec3<i32>(last));
+        if is_spared(vec3<u32>(voxel)) {
+            let weights = select(1.0 - w, w, up);
+            sum += weights.x * weights.y * weights.z * textureLoad(volume, voxel, 0).r;
+        }
+    }
+    return sum;
+}
+
 fn value_at(position: vec3<f32>) -> f32 {
     var texel = 0.0;
-    if by_hand() {
+    if only_spared {
+        return kept_at(position);
+    }
+    if params.by_hand == 1u {
         texel = interpolated(position);
     } else {
         texel = textureSampleLevel(volume, edge, (position + 0.5) / frame.dims.xyz, 0.0).r;
@@ -127,9 +140,21 @@ fn value_at(position: vec3<f32>) -> f32 {
     return texel * frame.scale + frame.bias;
 }
 
+// Direction of steepest rise of the values, in texels a voxel; of what clips leave, differences over two voxels.
+fn rise_at(position: vec3<f32>) -> vec3<f32> {
+    if !only_spared {
+        return texel_gradient(position);
+    }
+    var rise = vec3(0.0);
+    for (var i = 0u; i < 6u; i++) {
+        let way = vec3<f32>(vec3(i >> 1u) == vec3(0u, 1u, 2u)) * select(-1.0, 1.0, (i & 1u) == 1u);
+        rise += way * kept_at(position + way);
+    }
+    return rise;
+}
+
 #include "shared/shading.wgsl"
 #include "shared/feature_colour.wgsl"
-#include "shared/spared.wgsl"
 
 // Whether the rest of a ray's light cannot change a pixel of the picture by more than the frame's tolerance. It adds at most its share of
 // the brightest light to a component, or takes as much of a background; sRGB coding spreads that by its slope, which is largest at the
@@ -189,6 +214,18 @@ fn mean_depth(a: f32, b: f32) -> f32 {
     return 1.0 - (select(v * log(v), 0.0, v <= 0.0) - select(u * log(u), 0.0, u <= 0.0)) / width;
 }
 
+// Of a stretch along which opacity goes evenly from a to b, one of them above 0: the share of light that passes, and the share of its
+// length at which the light that it sends leaves it, on average.
+fn piece(a: f32, b: f32, length: f32) -> vec2<f32> {
+    let stops = min(a, b) >= 1.0;
+    let depth = length * mean_depth(a, b);
+    let passes = select(exp(-depth), 0.0, stops);
+    // Of an even stretch; and how much later where opacity rises.
+    let even = select(1.0 / depth - passes / (1.0 - passes), 0.5 - depth / 12.0, depth < 0.05);
+    let later = passes * (b - a) / (6.0 * (b + a));
+    return vec2(passes, select(even + later, 0.0, stops));
+}
+
 // Between two samples, `length` reference lengths apart: piece by piece of the transfer function.
 fn segment(near: Sample, far: Sample, length: f32) -> Segment {
     let up = far.value >= near.value;
@@ -206,14 +243,10 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
         let opacity = select(point.y, far.opacity, last);
         let done = select(clamp((value - near.value) / whole, begun, 1.0), 1.0, last);
         if max(here.opacity, opacity) > 0.0 && done > begun {
-            let stops = min(here.opacity, opacity) >= 1.0;
-            let depth = length * (done - begun) * mean_depth(here.opacity, opacity);
-            let passes = select(exp(-depth), 0.0, stops);
+            let found = piece(here.opacity, opacity, length * (done - begun));
+            let passes = found.x;
+            let within = found.y;
             let share = open * (1.0 - passes);
-            // Where the light of an even stretch leaves it, on average; and how much later where opacity rises.
-            let even = select(1.0 / depth - passes / (1.0 - passes), 0.5 - depth / 12.0, depth < 0.05);
-            let later = passes * (opacity - here.opacity) / (6.0 * (opacity + here.opacity));
-            let within = select(even + later, 0.0, stops);
             colour += share * colour_of(mix(here.value, value, within));
             centre += share * mix(begun, done, within);
             open *= passes;
@@ -278,13 +311,19 @@ fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
     return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
 }
 
-// Of a segment of a volume with features: opacities from near to far, between two depths.
+// A segment of a volume with features, whose values are opacities: from near to far, between two depths.
 fn segment_of_features(near: f32, far: f32, begin: f32, end: f32, start: vec3<f32>, along: vec3<f32>, per_depth: f32) -> Segment {
-    var found = segment(sample_of(near), sample_of(far), (end - begin) * per_depth);
-    if found.alpha > 0.0 {
-        found.colour = found.alpha * colour_at(start + mix(begin, end, found.centre) * along);
+    if max(near, far) <= 0.0 || end <= begin {
+        return Segment(0.0, vec3(0.0), 0.5);
     }
-    return found;
+    let found = piece(near, far, (end - begin) * per_depth);
+    let alpha = 1.0 - found.x;
+    return Segment(alpha, alpha * colour_at(start + mix(begin, end, found.y) * along), found.y);
+}
+
+// A value as it is, of a volume with features.
+fn opacity_sample(opacity: f32) -> Sample {
+    return Sample(opacity, 1u, opacity);
 }
 
 // What an eye sees at a place in pixels, up to a view depth. `featured`: of a volume with features.
@@ -396,49 +435,46 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
                 }
                 // Of what clips hide only what they leave whole counts.
                 let halves = shown_from != shown_to && clips.count > 0u;
-                var kept = Segment(0.0, vec3(0.0), 0.0);
-                var kept_end = 0.0;
+                var kept = Segment(0.0, vec3(0.0), 0.5);
+                var kept_ends = vec2(0.0);
                 if spares && clips.count > 0u && !(shown_from && shown_to) {
+                    let t_ends = vec2(select(t, sides.x, shown_from), select(t_next, sides.x, shown_to));
+                    kept_ends = vec2(kept_at(start + t_ends.x * along), kept_at(start + t_ends.y * along));
                     only_spared = true;
-                    let t_first = select(t, sides.x, halves && shown_from);
-                    let t_last = select(t_next, sides.x, halves && shown_to);
-                    let first_value = value_at(start + t_first * along);
-                    let last_value = value_at(start + t_last * along);
-                    kept = segment_of_features(first_value, last_value, t_first, t_last, start, along, slant / frame.light.w);
+                    kept = segment_of_features(kept_ends.x, kept_ends.y, t_ends.x, t_ends.y, start, along, slant / frame.light.w);
                     only_spared = false;
-                    kept_end = select(first_value, last_value, shown_from);
-                    if !halves {
-                        near = first_value;
-                        far = last_value;
-                    }
                 }
                 if shows || kept.alpha > 0.0 {
-                    var from_sample = sample_of(near);
-                    var to_sample = sample_of(far);
+                    var found = kept;
+                    var from_sample = opacity_sample(kept_ends.x);
+                    var to_sample = opacity_sample(kept_ends.y);
                     // in reference lengths
                     var length = (t_to - t_from) * slant / frame.light.w;
-                    var found = segment(from_sample, to_sample, length);
-                    if featured {
-                        if shows {
-                            found = segment_of_features(near, far, t_from, t_to, start, along, slant / frame.light.w);
-                        } else {
-                            found = kept;
-                        }
+                    if !featured {
+                        from_sample = sample_of(near);
+                        to_sample = sample_of(far);
+                        found = segment(from_sample, to_sample, length);
+                    } else if shows {
+                        let open_part = segment_of_features(near, far, t_from, t_to, start, along, slant / frame.light.w);
+                        found = open_part;
                         if spares && halves {
                             let share = (sides.x - t) / (t_next - t);
                             if shown_from {
-                                found = joined(found, kept, share);
-                                far = kept_end;
+                                found = joined(open_part, kept, share);
+                                far = kept_ends.y;
                             } else {
-                                found = joined(kept, found, share);
-                                near = kept_end;
+                                found = joined(kept, open_part, share);
+                                near = kept_ends.x;
                             }
                             t_from = t;
                             t_to = t_next;
-                            from_sample = sample_of(near);
-                            to_sample = sample_of(far);
                             length = (t_to - t_from) * slant / frame.light.w;
                         }
+                        from_sample = opacity_sample(near);
+                        to_sample = opacity_sample(far);
+                    } else {
+                        near = kept_ends.x;
+                        far = kept_ends.y;
                     }
                     if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
                         size /= 2u;

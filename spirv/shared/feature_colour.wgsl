@@ -1,5 +1,5 @@
 // The colour of a place of a volume with features: that of the feature which has the largest share of the place's opacity, of those of the
-// eight voxels round it; the lowest number where two have as much. Where the feature has no colour of its own, the transfer function's, of
+// eight voxels round it; the lowest number where two have as much; where clips hide the place, of those voxels that they leave whole. Where the feature has no colour of its own, the transfer function's, of
 // the mean value of the feature's voxels, which is one of the feature's own: no colour between two features is a third one's.
 //
 // Cost: 8 reads; 8 more of opacities where features meet, 8 more of values where the feature has no colour.
@@ -41,6 +41,9 @@ fn owner_of(position: vec3<f32>) -> Owner {
         let above = w.z * across * vec4(texel_at(l.x, l.y, h.z), texel_at(h.x, l.y, h.z), texel_at(l.x, h.y, h.z), texel_at(h.x, h.y, h.z));
         var most = 0.0;
         for (var k = 0u; k <= features.count; k++) {
+            if only_spared && features.each[k].spared == 0u {
+                continue;
+            }
             let share = dot(below, vec4<f32>(low == vec4(k))) + dot(above, vec4<f32>(high == vec4(k)));
             if share > most {
                 most = share;

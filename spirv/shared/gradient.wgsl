@@ -16,7 +16,7 @@ fn texel_gradient(position: vec3<f32>) -> vec3<f32> {
     let w = position - floored;
     let first = 1.0 + MIDDLE * (1.0 - w);
     let second = 1.0 + MIDDLE * w;
-    if by_hand() {
+    if params.by_hand == 1u {
         return gradient_by_hand(vec3<i32>(floored), w);
     }
     let low = floored - 1.0 + (w + MIDDLE * (1.0 - w)) / first;

@@ -177,7 +177,13 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let before = state(&renderer);
-        let mut features = Features::by_intervals(vec![(Feature::new("core"), [160.0, 190.0])]).unwrap();
+        let grid = grid_of(&volume);
+        let core = |i: usize| {
+            let p = grid.to_world(grid.voxel(i).map(|c| c as f64));
+            u8::from(p.iter().map(|c| c * c).sum::<f64>() < 144.0)
+        };
+        let labels = (0..grid.len()).map(core).collect();
+        let mut features = Features::by_labels(vec![Feature::new("core")], volume.dims, labels).unwrap();
         renderer.set_features(features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         // Beside a feature other matter has none, which is all the same to all methods but one.
@@ -190,7 +196,7 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let hidden = state(&renderer);
         assert!(hidden.0 != before.0 && hidden.1 != before.1, "{}", method.name());
         if method.entry().contextual && method.values() == method {
-            // The core and what rays of 4 mm see of it, in whole bricks, of a fruit twice as wide.
+            // A ball of 12 mm and what is within 6 mm of it, in whole bricks, of a volume of 60 mm.
             let found = renderer.categories().unwrap();
             let computed = found.affected as f64 / volume.len() as f64;
             assert!(computed > 0.02 && computed < 0.5, "{}: {computed}", method.name());
