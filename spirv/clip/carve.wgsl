@@ -23,6 +23,7 @@ struct Change {
     distance: array<f32>,
 }
 
+#include "shared/features.wgsl"
 #include "shared/growing.wgsl"
 #include "shared/parts.wgsl"
 #include "shared/transfer.wgsl"
@@ -40,9 +41,12 @@ var<immediate> params: CarveParams;
 @group(0) @binding(9) var<storage, read_write> change: Change;
 @group(0) @binding(10) var<storage, read_write> growing: GrowingList;
 @group(0) @binding(11) var<storage, read> list: BrickList;
+@group(0) @binding(13) var<uniform> features: Features;
+@group(0) @binding(14) var feature_index: texture_3d<u32>;
 @group(0) @binding(12) var opacity: texture_storage_3d<r16unorm, read_write>;
 
 #include "shared/clip_opacity.wgsl"
+#include "shared/spared.wgsl"
 
 const CUTTING = ALL_CLIPS << CUTTING_AT;
 const OF_INTEREST = VISIBILITY_MASK | CUTTING;
@@ -115,7 +119,7 @@ fn main(
         if listed && all(voxel < params.dims) {
             let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
             var value = opacity_of(value_of(voxel));
-            if value > 0.0 {
+            if value > 0.0 && !is_spared(voxel) {
                 value *= visible_share(code, centre, 0.5 * params.spacing, params.extra_samples);
             }
             let now = u32(round(value * PARTS));

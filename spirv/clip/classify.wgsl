@@ -38,8 +38,12 @@ const LITERAL = 1u;
 @group(0) @binding(7) var<storage, read_write> count: Count;
 @group(0) @binding(8) var<storage, read> clip_bricks: ClipBricks;
 
+@group(0) @binding(9) var<uniform> features: Features;
+@group(0) @binding(10) var feature_index: texture_3d<u32>;
+
 #include "shared/clip_opacity.wgsl"
 #include "shared/reach.wgsl"
+#include "shared/spared.wgsl"
 
 var<immediate> params: ClassifyParams;
 
@@ -105,7 +109,10 @@ fn classify(voxel: vec3<u32>, code: u32) -> u32 {
             dilated = dilated || any_in_reach(code, centre + first_nine(i) * half_edges);
         }
     }
-    let share = visible_share(code, centre, half_edges, params.extra_samples);
+    var share = 1.0;
+    if !is_spared(voxel) {
+        share = visible_share(code, centre, half_edges, params.extra_samples);
+    }
     textureStore(opacity, voxel, vec4(share * full, 0.0, 0.0, 0.0));
     if !dilated {
         return UNTOUCHED;
@@ -123,7 +130,9 @@ fn common_category(code: u32) -> u32 {
     if reach != ALL {
         return CATEGORIES;
     }
-    return select(select(CATEGORIES, AFFECTED, visibility == VISIBLE), CLIPPED, visibility == HIDDEN);
+    // Of a hidden brick clips may leave some voxels whole.
+    let hidden = visibility == HIDDEN && features.any_spared == 0u;
+    return select(select(CATEGORIES, AFFECTED, visibility == VISIBLE), CLIPPED, hidden);
 }
 
 // Two workgroups a brick, so that all invocations of one go the same way wherever the brick's word decides.

@@ -37,7 +37,8 @@ fn to_rays(index: u32) -> vec2<u32> {
 }
 
 fn first_of(index: u32) -> u32 {
-    return select(FAR, 0u, occupancy.visible[index] != 0u && to_rays(index).x == 0u);
+    let shows = occupancy.visible[index];
+    return select(FAR, 0u, shows != 0u && ((shows & SPARED) != 0u || to_rays(index).x == 0u));
 }
 
 // One invocation a brick.

@@ -45,7 +45,11 @@ fn ordered(value: f32) -> u32 {
 }
 
 fn can_show(index: u32) -> bool {
-    return index < brick_count(bricks_of(params.dims)) && occupancy.visible[index] != 0u && visibility_in(clip_bricks.code[index]) != HIDDEN;
+    if index >= brick_count(bricks_of(params.dims)) {
+        return false;
+    }
+    let shows = occupancy.visible[index];
+    return shows != 0u && ((shows & SPARED) != 0u || visibility_in(clip_bricks.code[index]) != HIDDEN);
 }
 
 // A voxel of a brick: an invocation takes one of each slice.

@@ -2,6 +2,10 @@
 // through which the value is taken as linear and its opacity integrated exactly; steps halve where a segment's opacity says little of its
 // parts. Leaps over bricks that show nothing, clipped parts skipped by the shadow test of section 3.2, ambient factor from V_AO in front of
 // where a segment's light comes from.
+//
+// With features, `featured`, the volume is that of opacities after features and the transfer function says that its values are opacities, so
+// that voxels are classified first and interpolated then (`features.wgsl`). Colours are those of features, and where a clip hides a place,
+// what of it belongs to a feature that clips leave whole is there all the same.
 
 #include "shared/transfer.wgsl"
 
@@ -14,6 +18,10 @@
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 @group(0) @binding(2) var<storage, read> bounds: Bounds;
+// with features only: the values of the volume, which voxel is whose, and how that is shown
+@group(0) @binding(13) var values: texture_3d<f32>;
+@group(0) @binding(14) var feature_index: texture_3d<u32>;
+@group(0) @binding(15) var<uniform> features: Features;
 
 // a layer a view: premultiplied, linear; depth by the view's planes, and before where rays end, see `ended`
 @group(0) @binding(10) var colours: texture_storage_2d_array<rgba32float, write>;
@@ -22,6 +30,7 @@
 @group(0) @binding(12) var half_colours: texture_storage_2d_array<rgba16float, write>;
 
 #include "shared/bounds.wgsl"
+#include "shared/spared.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/clips.wgsl"
 #include "shared/distances.wgsl"
@@ -41,6 +50,8 @@ struct RaycastParams {
     tiles: u32,
     // 1: `depths` holds at which depth in mm a pixel's rays end at the latest
     ended: u32,
+    // 1: V_AO has the values of features side by side
+    channels: u32,
 }
 
 struct Pixel {
@@ -71,6 +82,9 @@ const MOST_LIT = 0.125;
 // of its ends.
 const MOST_CHANGE = 0.125;
 
+// Whether clips hide the place that is looked at, so that only what they leave whole counts.
+var<private> only_spared = false;
+
 fn texel_at(x: i32, y: i32, z: i32) -> f32 {
     return textureLoad(volume, vec3(x, y, z), 0).r;
 }
@@ -95,8 +109,29 @@ fn interpolated(position: vec3<f32>) -> f32 {
     return mix(low, high, w.z);
 }
 
+// The same of a volume with features, of those voxels that clips leave whole.
+fn kept_at(position: vec3<f32>) -> f32 {
+    let last = frame.dims.xyz - 1.0;
+    let at = clamp(position, vec3(0.0), last);
+    let l = vec3<i32>(at);
+    let w = at - vec3<f32>(l);
+    var sum = 0.0;
+    for (var i = 0u; i < 8u; i++) {
+        let up = vec3(i & 1u, i >> 1u & 1u, i >> 2u) == vec3(1u);
+        let voxel = min(l + select(vec3(0), vec3(1), up), vec3<i32>(last));
+        if is_spared(vec3<u32>(voxel)) {
+            let weights = select(1.0 - w, w, up);
+            sum += weights.x * weights.y * weights.z * textureLoad(volume, voxel, 0).r;
+        }
+    }
+    return sum;
+}
+
 fn value_at(position: vec3<f32>) -> f32 {
     var texel = 0.0;
+    if only_spared {
+        return kept_at(position);
+    }
     if params.by_hand == 1u {
         texel = interpolated(position);
     } else {
@@ -105,7 +140,21 @@ fn value_at(position: vec3<f32>) -> f32 {
     return texel * frame.scale + frame.bias;
 }
 
+// Direction of steepest rise of the values, in texels a voxel; of what clips leave, differences over two voxels.
+fn rise_at(position: vec3<f32>) -> vec3<f32> {
+    if !only_spared {
+        return texel_gradient(position);
+    }
+    var rise = vec3(0.0);
+    for (var i = 0u; i < 6u; i++) {
+        let way = vec3<f32>(vec3(i >> 1u) == vec3(0u, 1u, 2u)) * select(-1.0, 1.0, (i & 1u) == 1u);
+        rise += way * kept_at(position + way);
+    }
+    return rise;
+}
+
 #include "shared/shading.wgsl"
+#include "shared/feature_colour.wgsl"
 
 // Whether the rest of a ray's light cannot change a pixel of the picture by more than the frame's tolerance. It adds at most its share of
 // the brightest light to a component, or takes as much of a background; sRGB coding spreads that by its slope, which is largest at the
@@ -165,6 +214,18 @@ fn mean_depth(a: f32, b: f32) -> f32 {
     return 1.0 - (select(v * log(v), 0.0, v <= 0.0) - select(u * log(u), 0.0, u <= 0.0)) / width;
 }
 
+// Of a stretch along which opacity goes evenly from a to b, one of them above 0: the share of light that passes, and the share of its
+// length at which the light that it sends leaves it, on average.
+fn piece(a: f32, b: f32, length: f32) -> vec2<f32> {
+    let stops = min(a, b) >= 1.0;
+    let depth = length * mean_depth(a, b);
+    let passes = select(exp(-depth), 0.0, stops);
+    // Of an even stretch; and how much later where opacity rises.
+    let even = select(1.0 / depth - passes / (1.0 - passes), 0.5 - depth / 12.0, depth < 0.05);
+    let later = passes * (b - a) / (6.0 * (b + a));
+    return vec2(passes, select(even + later, 0.0, stops));
+}
+
 // Between two samples, `length` reference lengths apart: piece by piece of the transfer function.
 fn segment(near: Sample, far: Sample, length: f32) -> Segment {
     let up = far.value >= near.value;
@@ -182,14 +243,10 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
         let opacity = select(point.y, far.opacity, last);
         let done = select(clamp((value - near.value) / whole, begun, 1.0), 1.0, last);
         if max(here.opacity, opacity) > 0.0 && done > begun {
-            let stops = min(here.opacity, opacity) >= 1.0;
-            let depth = length * (done - begun) * mean_depth(here.opacity, opacity);
-            let passes = select(exp(-depth), 0.0, stops);
+            let found = piece(here.opacity, opacity, length * (done - begun));
+            let passes = found.x;
+            let within = found.y;
             let share = open * (1.0 - passes);
-            // Where the light of an even stretch leaves it, on average; and how much later where opacity rises.
-            let even = select(1.0 / depth - passes / (1.0 - passes), 0.5 - depth / 12.0, depth < 0.05);
-            let later = passes * (opacity - here.opacity) / (6.0 * (opacity + here.opacity));
-            let within = select(even + later, 0.0, stops);
             colour += share * colour_of(mix(here.value, value, within));
             centre += share * mix(begun, done, within);
             open *= passes;
@@ -202,6 +259,15 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
         here = Sample(value, piece, transfer.opacity[select(piece, piece - 1u, up)].y);
     }
     let alpha = 1.0 - open;
+    return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
+}
+
+// Two segments one behind the other as one, the first of which has a share of the length.
+fn joined(a: Segment, b: Segment, share: f32) -> Segment {
+    let behind = (1.0 - a.alpha) * b.alpha;
+    let alpha = a.alpha + behind;
+    let colour = a.colour + (1.0 - a.alpha) * b.colour;
+    let centre = a.alpha * a.centre * share + behind * mix(share, 1.0, b.centre);
     return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
 }
 
@@ -245,8 +311,23 @@ fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
     return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
 }
 
-// What an eye sees at a place in pixels, up to a view depth.
-fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
+// A segment of a volume with features, whose values are opacities: from near to far, between two depths.
+fn segment_of_features(near: f32, far: f32, begin: f32, end: f32, start: vec3<f32>, along: vec3<f32>, per_depth: f32) -> Segment {
+    if max(near, far) <= 0.0 || end <= begin {
+        return Segment(0.0, vec3(0.0), 0.5);
+    }
+    let found = piece(near, far, (end - begin) * per_depth);
+    let alpha = 1.0 - found.x;
+    return Segment(alpha, alpha * colour_at(start + mix(begin, end, found.y) * along), found.y);
+}
+
+// A value as it is, of a volume with features.
+fn opacity_sample(opacity: f32) -> Sample {
+    return Sample(opacity, 1u, opacity);
+}
+
+// What an eye sees at a place in pixels, up to a view depth. `featured`: of a volume with features.
+fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
@@ -256,6 +337,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
     // Parts of a stretch: whole steps, so that rounding does not decide.
     let stretch = PARTS * u32(clamp(smallest_spacing() / frame.spacing.w + 0.01, 1.0, STEPS_LIT));
     let bricks = bricks_of(vec3<u32>(frame.dims.xyz));
+    // Whether something of what clips hide is there all the same.
+    let spares = featured && features.any_spared == 1u;
 
     var colour = vec3(0.0);
     var alpha = 0.0;
@@ -326,6 +409,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                 var far = next;
                 var shows = true;
                 var shown_to = true;
+                // At a cut: depths on its two sides, the hidden one first.
+                var sides = vec2(t);
                 if clips.count > 0u {
                     // A place is asked once, though two segments meet there.
                     if asked_n != n {
@@ -335,7 +420,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                     shows = shown_from || shown_to;
                     if shown_from != shown_to {
                         // Only the part on one side of the cut shows.
-                        let sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
+                        sides = cut_between(select(vec2(t_next, t), vec2(t, t_next), shown_to), eye, ray.direction);
                         let at_cut = value_at(start + sides.y * along);
                         if shown_to {
                             t_from = sides.y;
@@ -348,12 +433,49 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
                         }
                     }
                 }
-                if shows {
-                    let from_sample = sample_of(near);
-                    let to_sample = sample_of(far);
+                // Of what clips hide only what they leave whole counts.
+                let halves = shown_from != shown_to && clips.count > 0u;
+                var kept = Segment(0.0, vec3(0.0), 0.5);
+                var kept_ends = vec2(0.0);
+                if spares && clips.count > 0u && !(shown_from && shown_to) {
+                    let t_ends = vec2(select(t, sides.x, shown_from), select(t_next, sides.x, shown_to));
+                    kept_ends = vec2(kept_at(start + t_ends.x * along), kept_at(start + t_ends.y * along));
+                    only_spared = true;
+                    kept = segment_of_features(kept_ends.x, kept_ends.y, t_ends.x, t_ends.y, start, along, slant / frame.light.w);
+                    only_spared = false;
+                }
+                if shows || kept.alpha > 0.0 {
+                    var found = kept;
+                    var from_sample = opacity_sample(kept_ends.x);
+                    var to_sample = opacity_sample(kept_ends.y);
                     // in reference lengths
-                    let length = (t_to - t_from) * slant / frame.light.w;
-                    let found = segment(from_sample, to_sample, length);
+                    var length = (t_to - t_from) * slant / frame.light.w;
+                    if !featured {
+                        from_sample = sample_of(near);
+                        to_sample = sample_of(far);
+                        found = segment(from_sample, to_sample, length);
+                    } else if shows {
+                        let open_part = segment_of_features(near, far, t_from, t_to, start, along, slant / frame.light.w);
+                        found = open_part;
+                        if spares && halves {
+                            let share = (sides.x - t) / (t_next - t);
+                            if shown_from {
+                                found = joined(open_part, kept, share);
+                                far = kept_ends.y;
+                            } else {
+                                found = joined(kept, open_part, share);
+                                near = kept_ends.x;
+                            }
+                            t_from = t;
+                            t_to = t_next;
+                            length = (t_to - t_from) * slant / frame.light.w;
+                        }
+                        from_sample = opacity_sample(near);
+                        to_sample = opacity_sample(far);
+                    } else {
+                        near = kept_ends.x;
+                        far = kept_ends.y;
+                    }
                     if size > 1u && varies(found, from_sample, to_sample, length, open * (1.0 - alpha)) {
                         size /= 2u;
                         asked_n = n;
@@ -382,15 +504,25 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32) -> Pixel {
         // It is lit where its light comes from.
         let stops = 1.0 - open;
         let t_shown = centre.x / stops;
+        if spares && clips.count > 0u {
+            only_spared = !visible_to(asked_at(start + t_shown * along, bricks), eye.origin.xyz + t_shown * ray.direction);
+        }
         let at = Shown(
             start + t_shown * along,
             eye.origin.xyz + t_shown * ray.direction,
             centre.y / stops,
             tint / stops,
-            cut,
+            // What clips leave whole they do not cut.
+            select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,
         );
+        if featured && params.channels == 1u {
+            // Of no feature: whatever is darkest there. With more features than channels all of them hold the same.
+            let feature = owner_of(at.position).feature;
+            channel = select((feature - 1u) % LEAST, LEAST, feature == 0u);
+        }
         colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
+        only_spared = false;
         alpha += (1.0 - alpha) * stops;
         if depth == nothing && alpha >= 0.5 {
             depth = eye.depth.x + eye.depth.y / t_shown;
@@ -421,7 +553,7 @@ fn is_inside(texel: vec2<u32>) -> bool {
 }
 
 // The mean of a pixel's samples, and the depth of the one nearest to its centre.
-fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
+fn pixel_of(texel: vec2<u32>, view: u32, featured: bool) -> Pixel {
     let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
     var end = 3e38;
     if params.ended == 1u {
@@ -430,7 +562,7 @@ fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
     var mean = Pixel(vec4(0.0), 1.0);
     for (var i = 0u; i < frame.samples; i++) {
         let pair = frame.places[i / 2u];
-        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end);
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end, featured);
         mean.colour += frame.share * one.colour;
         if i == 0u {
             mean.depth = one.depth;
@@ -443,7 +575,7 @@ fn pixel_of(texel: vec2<u32>, view: u32) -> Pixel {
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     let texel = texel_of(group, local.xy);
     if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z);
+        let pixel = pixel_of(texel, group.z, false);
         textureStore(colours, texel, group.z, pixel.colour);
         textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
     }
@@ -453,7 +585,27 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) l
 fn half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
     let texel = texel_of(group, local.xy);
     if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z);
+        let pixel = pixel_of(texel, group.z, false);
+        textureStore(half_colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z, true);
+        textureStore(colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured_half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let texel = texel_of(group, local.xy);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z, true);
         textureStore(half_colours, texel, group.z, pixel.colour);
         textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
     }

@@ -1,5 +1,5 @@
 // What a frame does of a build that spans frames, and how it ends (method.md section 5.5). `choose`: how many bricks of the list are this
-// slice's, and whether they are its last. `halves` and `floats`: what was computed into a volume of its own becomes the one that is shown,
+// slice's, and whether they are its last. `halves`, `fours` and `floats`: what was computed into a volume of its own becomes the one that is shown,
 // brick by brick, after the last slice and never before; one for each format of V_AO.
 
 struct CommitParams {
@@ -30,6 +30,7 @@ var<immediate> params: CommitParams;
 @group(0) @binding(2) var made: texture_3d<f32>;
 @group(0) @binding(3) var half_shown: texture_storage_3d<r16unorm, write>;
 @group(0) @binding(4) var shown: texture_storage_3d<r32float, write>;
+@group(0) @binding(5) var fours_shown: texture_storage_3d<rgba16unorm, write>;
 
 fn groups_for(items: u32) -> vec2<u32> {
     return select(groups_through(max(items, 1u) - 1u), vec2(0u), items == 0u);
@@ -71,6 +72,17 @@ fn halves(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id)
         let voxel = corner + local + vec3(0u, 0u, slice);
         if all(voxel < params.dims) {
             textureStore(half_shown, voxel, vec4(textureLoad(made, voxel, 0).r, 0.0, 0.0, 0.0));
+        }
+    }
+}
+
+@compute @workgroup_size(BRICK, BRICK, SLICES)
+fn fours(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    let corner = corner_of(group);
+    for (var slice = 0u; slice < BRICK; slice += SLICES) {
+        let voxel = corner + local + vec3(0u, 0u, slice);
+        if all(voxel < params.dims) {
+            textureStore(fours_shown, voxel, textureLoad(made, voxel, 0));
         }
     }
 }

@@ -2,6 +2,8 @@
 // between the smallest and the largest of the brick's voxels and their neighbours. Samples interpolate between voxels,
 // so their value stays in that range, and a brick without opacity there can be skipped without changing the picture.
 
+// Of a volume with features the values are opacities, and clips leave some of them.
+
 struct OccupancyParams {
     dims: vec3<u32>,
     scale: f32,
@@ -15,6 +17,10 @@ struct OccupancyParams {
 var<immediate> params: OccupancyParams;
 @group(0) @binding(0) var volume: texture_3d<f32>;
 @group(0) @binding(2) var<storage, read_write> occupancy: Occupancy;
+@group(0) @binding(3) var<uniform> features: Features;
+@group(0) @binding(4) var feature_index: texture_3d<u32>;
+
+#include "shared/spared.wgsl"
 
 // Bricks along x that a workgroup takes, and the voxels of their rows with one more at each end.
 const TAKEN = LANES / BRICK;
@@ -22,6 +28,8 @@ const ROW = LANES + 2u;
 
 // Smallest and largest value of the columns of voxels that these bricks and their neighbours' nearest have above a row.
 var<workgroup> columns: array<vec2<f32>, ROW>;
+// Whether some voxel of them has opacity that clips leave.
+var<workgroup> spared: array<u32, ROW>;
 
 fn joined(a: vec2<f32>, b: vec2<f32>) -> vec2<f32> {
     return vec2(min(a.x, b.x), max(a.y, b.y));
@@ -44,6 +52,16 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
             }
         }
         columns[i] = range;
+        var left = 0u;
+        if features.any_spared == 1u {
+            for (var z = low.z; z <= high.z; z++) {
+                for (var y = low.y; y <= high.y; y++) {
+                    let voxel = vec3(x, y, z);
+                    left |= u32(is_spared(vec3<u32>(voxel)) && textureLoad(volume, voxel, 0).r > 0.0);
+                }
+            }
+        }
+        spared[i] = left;
     }
     workgroupBarrier();
     let brick = first + vec3(lane, 0u, 0u);
@@ -51,11 +69,13 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     var range = columns[lane * BRICK];
+    var left = spared[lane * BRICK];
     for (var i = 1u; i < BRICK + 2u; i++) {
         range = joined(range, columns[lane * BRICK + i]);
+        left |= spared[lane * BRICK + i];
     }
     // Filtering rounds: by less than one part in 2^16 of the largest texel. Texels of 0 stay 0.
     let slack = 1.6e-5 * max(abs(range.x - params.bias), abs(range.y - params.bias));
     let opacity = largest_opacity(range.x - slack, range.y + slack);
-    occupancy.visible[brick_index(brick, params.bricks)] = select(0u, 1u, opacity > 0.0);
+    occupancy.visible[brick_index(brick, params.bricks)] = select(0u, SHOWS | left * SPARED, opacity > 0.0);
 }

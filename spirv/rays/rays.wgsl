@@ -25,24 +25,6 @@ struct RaysParams {
     shift: f32,
 }
 
-struct Direction {
-    // in UNITths of a voxel
-    step: vec3<i32>,
-    // what a lost half cell adds to a sum
-    factor: f32,
-    // in voxels
-    half_step: vec3<f32>,
-}
-
-struct Directions {
-    all: array<Direction>,
-}
-
-struct Cells {
-    // a / -ln(1 - a) in WHOLE + 1ths, at a = multiples of 256 / WHOLE
-    mean: array<u32, MEANS>,
-}
-
 // T in WHOLEths, and its integral in WHOLEths of half a step.
 struct Ray {
     through: u32,
@@ -50,8 +32,7 @@ struct Ray {
 }
 
 #include "shared/bricks.wgsl"
-#include "shared/opaque.wgsl"
-#include "shared/parts.wgsl"
+#include "shared/whole_rays.wgsl"
 
 var<immediate> params: RaysParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
@@ -61,28 +42,6 @@ var<immediate> params: RaysParams;
 @group(0) @binding(3) var<storage, read> cells: Cells;
 @group(0) @binding(4) var<storage, read> list: BrickList;
 @group(0) @binding(5) var ambient: texture_storage_3d<r16unorm, write>;
-
-// PARTS as a whole number: T of a ray that met nothing.
-const WHOLE = 65535u;
-// Parts of a voxel that far cells are found in.
-const UNIT = 65536;
-const UNIT_BITS = 16u;
-// Parts of a WHOLEth that a voxel's sum is in.
-const FINE = 16384u;
-const FINE_BITS = 14u;
-// Entries of a table of cells' means, 256 opacities from one to the next.
-const MEANS = 257u;
-// A ray with less than 2^-10 is at its end: looked at after the near cells of `hybrid`, each cell of `linear`, each group of far ones.
-const DARK = 64u;
-// Cells of `hybrid` that have the filter's opacity.
-const NEAR = 3u;
-// Far cells that are looked up together: behind near cells, and without them.
-const FEW = 2u;
-const MANY = 4u;
-
-const NEAREST = 0u;
-const HYBRID = 1u;
-const LINEAR = 2u;
 
 // Invocations of a workgroup.
 const TEAM = 256u;
@@ -98,7 +57,6 @@ var<workgroup> found: atomic<u32>;
 var<workgroup> members: array<atomic<u32>, VOXELS / 2u>;
 // What occlusion takes from them, in FINEths of a WHOLEth.
 var<workgroup> sums: array<atomic<u32>, VOXELS>;
-var<workgroup> cell_means: array<u32, MEANS>;
 
 fn needed(local: vec3<u32>) -> bool {
     var bits = 0u;
@@ -108,26 +66,6 @@ fn needed(local: vec3<u32>) -> bool {
         }
     }
     return (bits >> local.x & 7u) != 0u;
-}
-
-// 1 - a; a filter of opaque matter is opaque, whatever it rounds.
-fn clear(a: vec4<f32>) -> vec4<f32> {
-    let q = 1.0 - a;
-    return select(q, vec4(0.0), q < vec4(OPAQUE));
-}
-
-// In WHOLEths, of one step. Four at once: one branch, which all take alike.
-fn in_steps(a: vec4<f32>) -> vec4<u32> {
-    var of_step = a;
-    if params.exponent != 1.0 {
-        of_step = select(1.0 - pow(clear(a), vec4(params.exponent)), vec4(0.0), a == vec4(0.0));
-    }
-    // 2^23 is where whole numbers are all that f32 has.
-    return bitcast<vec4<u32>>(of_step * PARTS + 8388608.0) & vec4(0xffffu);
-}
-
-fn in_step(a: f32) -> u32 {
-    return in_steps(vec4(a, 0.0, 0.0, 0.0)).x;
 }
 
 // One cell of opacity `a`; `halves` is what it counts.

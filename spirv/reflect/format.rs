@@ -27,6 +27,8 @@ pub enum Format {
     Bgra8Srgb,
     /// Ten bits each of red (the lowest), green and blue, two of alpha, read as 0…1.
     A2b10g10r10Unorm,
+    /// Four 16-bit channels, 0…65535 read as 0…1.
+    Rgba16Unorm,
     /// Four half floats.
     Rgba16Float,
     /// Four floats.
@@ -51,7 +53,7 @@ impl Format {
             Self::Rg32Float => (8, Texel::Float),
             Self::Rgba8Unorm | Self::Rgba8Srgb | Self::Bgra8Unorm | Self::Bgra8Srgb => (4, Texel::Float),
             Self::A2b10g10r10Unorm => (4, Texel::Float),
-            Self::Rgba16Float => (8, Texel::Float),
+            Self::Rgba16Unorm | Self::Rgba16Float => (8, Texel::Float),
             Self::Rgba32Float => (16, Texel::Float),
             Self::D16Unorm => (2, Texel::Depth),
             Self::D24UnormS8 | Self::D32Float => (4, Texel::Depth),

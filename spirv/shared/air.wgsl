@@ -10,9 +10,21 @@
 // Rise a voxel below which the way out shortens, to none where there is no surface. At a wall it is 0.2 and more.
 const LEAST_RISE = 0.1;
 
+// Which channel of V_AO is read: of values of features side by side (fdao.wgsl) that of the feature of the place that is looked at, or LEAST,
+// the least of four.
+var<private> channel = 0u;
+const LEAST = 4u;
+
+fn channel_of(texel: vec4<f32>) -> f32 {
+    if channel == LEAST {
+        return min(min(texel.x, texel.y), min(texel.z, texel.w));
+    }
+    return dot(texel, vec4<f32>(vec4(channel) == vec4(0u, 1u, 2u, 3u)));
+}
+
 // The field itself, ones included: they are out of the matter.
 fn ambient_between(position: vec3<f32>) -> f32 {
-    return textureSampleLevel(ambient, edge, (position + 0.5) / frame.dims.xyz, 0.0).r;
+    return channel_of(textureSampleLevel(ambient, edge, (position + 0.5) / frame.dims.xyz, 0.0));
 }
 
 // The air in front of a place: its index coordinates, and V_AO there by how it rises at the place.
@@ -29,7 +41,7 @@ fn air_of(position: vec3<f32>) -> vec4<f32> {
 }
 
 fn factor_at(x: i32, y: i32, z: i32) -> f32 {
-    return textureLoad(ambient, vec3(x, y, z), 0).r;
+    return channel_of(textureLoad(ambient, vec3(x, y, z), 0));
 }
 
 // Rounded to 1/256 voxel: the field itself, sampled on a finer lattice than the voxels'. The two eyes' rays meet a point with

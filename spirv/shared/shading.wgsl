@@ -56,7 +56,7 @@ fn reflected(normal: vec3<f32>, front: f32, back: f32, towards_eye: vec3<f32>) -
 // Inside the volume, by the gradient of the values. Opacity a voxel before and behind the place along the gradient says how much of a
 // surface there is, relative to the largest of the three, and which side is out: a ridge has two.
 fn reflected_inside(at: Shown, towards_eye: vec3<f32>) -> vec2<f32> {
-    let gradient = texel_gradient(at.position) / frame.spacing.xyz;
+    let gradient = rise_at(at.position) / frame.spacing.xyz;
     let rise = length(gradient);
     let none = vec2(NO_DIRECTION, 0.0);
     if !(rise > 0.0) {

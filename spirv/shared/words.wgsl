@@ -2,7 +2,11 @@
 
 #include "shared/bricks.wgsl"
 
-// Not 0 where it can show something, whatever the clips hide.
+// Not 0 where it can show something, whatever the clips hide; bits.
+const SHOWS = 1u;
+// Some of it clips leave whole.
+const SPARED = 2u;
+
 struct Occupancy {
     visible: array<u32>,
 }

@@ -15,6 +15,8 @@
 
 struct ConsistencyParams {
     count: u32,
+    // 1: V_AO has four channels, of which the least is read
+    channels: u32,
 }
 
 struct Points {
@@ -44,6 +46,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.count {
         return;
     }
+    channel = select(0u, LEAST, params.channels == 1u);
     let world = points.world[id.x];
     for (var view = 0u; view < 2u; view++) {
         let eye = frame.eye[view];

@@ -74,13 +74,15 @@ pub struct Changed {
     pub anew: bool,
     /// Shapes, sides or poses.
     pub clips: bool,
+    /// Values by which voxels belong to features: to methods that read these, every ambient value is out of date.
+    pub features: bool,
 }
 
 impl Changed {
     /// Nothing is up to date.
-    pub const ALL: Self = Self { opacities: true, anew: true, clips: true };
+    pub const ALL: Self = Self { opacities: true, anew: true, clips: true, features: true };
     /// Everything is up to date.
-    pub const NOTHING: Self = Self { opacities: false, anew: false, clips: false };
+    pub const NOTHING: Self = Self { opacities: false, anew: false, clips: false, features: false };
 
     /// These changes and others.
     pub fn and(self, other: Self) -> Self {
@@ -88,6 +90,7 @@ impl Changed {
             opacities: self.opacities || other.opacities,
             anew: self.anew || other.anew,
             clips: self.clips || other.clips,
+            features: self.features || other.features,
         }
     }
 }

@@ -28,6 +28,9 @@ pub trait Gather: Send + Sync + Sized {
     /// Its name, for who has no device for it.
     const NAME: &str;
 
+    /// Format of V_AO.
+    const FORMAT: Format = Format::R16Unorm;
+
     /// For the subject's settings. Uses the device's queue and waits for it.
     ///
     /// # Errors
@@ -52,6 +55,12 @@ pub trait Gather: Send + Sync + Sized {
     /// What comes before opacities where settings are new.
     fn settings<'a>(&'a self, on: &'a Subject) -> Option<Part<'a>> {
         let _ = on;
+        None
+    }
+
+    /// Notes bricks in which what values depend on beside opacities changed, with 0 in `change`, after edits of features.
+    fn changed<'a>(&'a self, on: &'a Subject, change: &'a Buffer) -> Option<Part<'a>> {
+        let _ = (on, change);
         None
     }
 
@@ -86,7 +95,7 @@ pub struct Target<'a> {
 struct Volumes {
     /// V_o: opacity after transfer function and clips, r16unorm.
     opacity: Image,
-    /// V_AO, r16unorm.
+    /// V_AO.
     ambient: Image,
     /// Bricks that the last update computed, and those that have values, u32 each.
     todo: Buffer,
@@ -101,20 +110,22 @@ struct Volumes {
 
 impl Volumes {
     /// Allocates them for a field: V_o holds 0 and V_AO 1. Uses the device's queue and waits for it.
-    fn new(gpu: &Gpu, field: &Field, method: &str) -> Result<Self> {
-        if !(gpu.stores(Format::R16Unorm) && gpu.filters(Format::R16Unorm)) {
-            return Err(cao_gpu::Error::Device {
-                problem: format!(
-                    "has no filtered storage images of R16_UNORM, which method {method} needs; choose method cao or lao"
-                ),
+    fn new(gpu: &Gpu, field: &Field, method: &str, ambient: Format) -> Result<Self> {
+        for (format, name) in [(Format::R16Unorm, "R16_UNORM"), (ambient, "R16G16B16A16_UNORM")] {
+            if !(gpu.stores(format) && gpu.filters(format)) {
+                return Err(cao_gpu::Error::Device {
+                    problem: format!(
+                        "has no filtered storage images of {name}, which method {method} needs; choose method cao or lao"
+                    ),
+                }
+                .into());
             }
-            .into());
         }
         let bricks = 4 * u64::from(field.brick_count());
         let brick_buffer = |name| gpu.buffer(name, bricks, BufferUse::Device);
         let volumes = Self {
             opacity: volume_image(gpu, "opacity", field, Format::R16Unorm)?,
-            ambient: volume_image(gpu, "ambient", field, Format::R16Unorm)?,
+            ambient: volume_image(gpu, "ambient", field, ambient)?,
             todo: brick_buffer("bricks to do")?,
             clip_bricks: ClipBricks::buffer(gpu, field)?,
             clip_bricks_before: ClipBricks::buffer(gpu, field)?,
@@ -174,7 +185,7 @@ impl<G: Gather> ByBrick<G> {
         let gather = G::new(on)?;
         Ok(Self {
             kernels: Kernels::new(&on.gpu)?,
-            volumes: Volumes::new(&on.gpu, &on.field, G::NAME)?,
+            volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::FORMAT)?,
             gather,
         })
     }
@@ -189,13 +200,15 @@ impl<G: Gather> ByBrick<G> {
         let all = [Access::StorageRead, Access::StorageWrite];
         Part::short(stages::CARVE, move |rec| {
             on.record_clip_bricks(rec, &k.clip_bricks, 0.0, &v.clip_bricks)?;
+            let (field, transfer) = on.opacities();
             k.carve.record(
                 rec,
-                &on.field,
+                field,
                 on.setup.anti_aliasing,
                 changed.opacities,
                 carve::Bindings {
-                    transfer: &on.transfer_buffer,
+                    transfer,
+                    features: &on.features,
                     clips: &on.clip_set,
                     clip_bricks: &v.clip_bricks,
                     clip_bricks_before: &v.clip_bricks_before,
@@ -265,6 +278,9 @@ impl<G: Gather> Ambient for ByBrick<G> {
             parts.extend(self.gather.settings(on));
         }
         parts.push(self.carve(on, changed));
+        if changed.features {
+            parts.extend(self.gather.changed(on, &v.change));
+        }
         parts.extend(self.gather.prepare(on, &v.opacity));
         parts.extend([self.choose(to, &v.todo, changed.anew), self.compute(to)]);
         parts

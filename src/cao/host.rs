@@ -60,13 +60,17 @@ pub fn read_texels(gpu: &Gpu, image: &Image) -> Result<Vec<u8>> {
     Ok(all)
 }
 
-/// What the texels of an r32float or r16unorm volume stand for, x fastest. Uses the device's queue and waits for it.
+/// What the texels of an r32float or r16unorm volume stand for, x fastest; of rgba16unorm the least of four. Uses the device's queue and waits for it.
 pub fn read_values(gpu: &Gpu, image: &Image) -> Result<Vec<f32>> {
     let texels = read_texels(gpu, image)?;
     Ok(match image.desc().format {
         Format::R16Unorm => bytemuck::pod_collect_to_vec::<u8, u16>(&texels)
             .into_iter()
             .map(|texel| f32::from(texel) / PARTS)
+            .collect(),
+        Format::Rgba16Unorm => bytemuck::pod_collect_to_vec::<u8, [u16; 4]>(&texels)
+            .into_iter()
+            .map(|texel| f32::from(texel.into_iter().fold(u16::MAX, u16::min)) / PARTS)
             .collect(),
         _ => bytemuck::pod_collect_to_vec(&texels),
     })

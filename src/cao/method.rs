@@ -5,6 +5,7 @@ use crate::ambient::Ambient;
 use crate::by_brick::ByBrick;
 use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
+use crate::features::driven::Driven;
 use crate::rays::traced::Traced;
 use crate::subject::Subject;
 use cao_model::methods::Method;
@@ -18,6 +19,12 @@ struct Maker {
 }
 
 const MAKERS: &[Maker] = &[
+    // Changes are found in the opacities and the features; nothing is dilated.
+    Maker {
+        method: Method::FeatureDriven,
+        new: |on| Ok(Box::new(ByBrick::<Driven>::new(on)?)),
+        map_radius: |_| None,
+    },
     Maker {
         method: Method::Lao,
         new: |on| Ok(Box::new(Full::new(on)?)),

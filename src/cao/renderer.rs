@@ -19,6 +19,7 @@ use crate::draw::raycast::Raycast;
 use crate::draw::scene_depth::SceneDepth;
 use crate::drive::Pace;
 use crate::field::Field;
+use crate::field::features::FeatureSet;
 use crate::field::volume_image;
 use crate::host::read_values;
 use crate::method;
@@ -26,6 +27,7 @@ use crate::subject::Subject;
 use crate::{Error, Result};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_model::clip::Clip;
+use cao_model::feature::Features;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -117,6 +119,24 @@ impl Renderer {
         Ok(())
     }
 
+    /// Changes the features. How features are shown, visibility, opacity, colour, spared by clips, never uses a queue, and the next update
+    /// computes what that affects. Features of other voxels are copied to the device, by its queue, which is waited for; then the next update
+    /// computes everything, and nothing is shown before.
+    ///
+    /// # Errors
+    /// Those of [`Features::check`], and of a device without memory; the features stay as they were.
+    pub fn set_features(&mut self, features: Features) -> Result<()> {
+        features.check(Some(self.subject.field.dims.map(|d| d as usize)))?;
+        if features.same_voxels(&self.subject.features.features) {
+            self.subject.features.show(features);
+            self.edited(Changed { opacities: true, ..Changed::NOTHING });
+            return Ok(());
+        }
+        self.subject.features = FeatureSet::new(&self.subject.gpu, &self.subject.field, features)?;
+        self.spoil();
+        Ok(())
+    }
+
     fn edited(&mut self, changed: Changed) {
         (self.changed, self.unshown) = (self.changed.and(changed), self.unshown.and(changed));
     }
@@ -173,7 +193,8 @@ impl Renderer {
         let written = self.subject.field.overwrite(&self.subject.gpu, first, values);
         // Values that are refused change nothing; where the device fails some may be there.
         if !matches!(written, Err(Error::Model(_))) {
-            self.edited(Changed { opacities: true, ..Changed::NOTHING });
+            let features = self.subject.features.follow_values();
+            self.edited(Changed { opacities: true, features, ..Changed::NOTHING });
         }
         written
     }

@@ -12,6 +12,8 @@ pub const DIRECTIONS: Stage = Stage::new("directions", Phase::Prepare);
 pub const PRECOMPUTE_BRICKS: Stage = Stage::new("precompute bricks", Phase::Prepare);
 /// V_PAO.
 pub const PRECOMPUTE: Stage = Stage::new("precompute lao", Phase::Prepare);
+/// Opacities after features.
+pub const FEATURES: Stage = Stage::new("features", Phase::Opacity);
 /// Which bricks can have opacity.
 pub const OCCUPANCY: Stage = Stage::new("occupancy", Phase::Opacity);
 /// V_o before clipping.
@@ -32,6 +34,10 @@ pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
 pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
 /// Rays of these bricks.
 pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
+/// Which bricks have other features.
+pub const LABELS: Stage = Stage::new("labels", Phase::Ambient);
+/// Rays of features of the bricks within reach of a change.
+pub const FDAO: Stage = Stage::new("fdao", Phase::Ambient);
 /// What a build made of several frames is shown.
 pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 /// How far rays of the picture may leap.

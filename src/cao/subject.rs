@@ -7,11 +7,13 @@ use crate::clip::dilate::Dilate;
 use crate::clip::peel::Peel;
 use crate::drive::Part;
 use crate::field::Field;
+use crate::field::features::{Classes, FeatureSet};
 use crate::field::occupancy::Occupancy;
 use crate::field::transfer::TransferBuffer;
 use crate::stages;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
 use cao_model::clip::Clip;
+use cao_model::feature::Features;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -27,6 +29,8 @@ pub struct Subject {
     pub occupancy: Buffer,
     /// Opacity and colour, as kernels read them.
     pub transfer_buffer: TransferBuffer,
+    /// The features: which voxel is whose, and how each is shown.
+    pub features: FeatureSet,
     /// The clips, as kernels read them.
     pub clip_set: ClipSet,
     /// How V_AO is computed: by the last update that began.
@@ -37,6 +41,7 @@ pub struct Subject {
     pub(crate) ambient_mm: f32,
     pub(crate) transfer: TransferFunction,
     pub(crate) clips: Vec<Clip>,
+    classes: Classes,
     occupancy_kernel: Occupancy,
     peel: Peel,
     dilate: Dilate,
@@ -52,12 +57,14 @@ impl Subject {
             gpu: gpu.clone(),
             occupancy: gpu.buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device)?,
             transfer_buffer: TransferBuffer::new(gpu)?,
+            features: FeatureSet::new(gpu, &field, Features::NONE)?,
             clip_set: ClipSet::new(gpu)?,
             ambient_mm: transfer.reference_mm(f64::from(field.min_spacing())),
             setup,
             wanted: setup,
             transfer,
             clips: Vec::new(),
+            classes: Classes::new(gpu)?,
             occupancy_kernel: Occupancy::new(gpu)?,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,
@@ -91,15 +98,27 @@ impl Subject {
         self.clip_set.make(&self.gpu, &self.peel, &self.dilate)
     }
 
-    /// The transfer function's table, and the bricks that it gives opacity.
-    pub(crate) fn occupancy(&self) -> Part<'_> {
-        Part::short(stages::OCCUPANCY, |rec| {
-            self.transfer_buffer.record(rec, &self.transfer)?;
+    /// What opacities before clipping come from: values, and the function that gives them opacity. With features the values are opacities
+    /// already, each voxel's own.
+    pub fn opacities(&self) -> (&Field, &TransferBuffer) {
+        self.features.opacities().unwrap_or((&self.field, &self.transfer_buffer))
+    }
+
+    /// The transfer function's table, opacities after features, and the bricks that have any.
+    pub(crate) fn classified(&self) -> Vec<Part<'_>> {
+        let features = Part::short(stages::FEATURES, |rec| {
+            let (field, buffer) = (&self.field, &self.transfer_buffer);
+            buffer.record(rec, &self.transfer)?;
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::UniformRead]);
-            self.occupancy_kernel.record(rec, &self.field, &self.transfer_buffer, &self.occupancy)?;
+            self.features.record(rec, &self.classes, field, &self.transfer, buffer)
+        });
+        let occupancy = Part::short(stages::OCCUPANCY, |rec| {
+            let (field, transfer) = self.opacities();
+            self.occupancy_kernel.record(rec, field, transfer, &self.features, &self.occupancy)?;
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
             Ok(())
-        })
+        });
+        vec![features, occupancy]
     }
 
     /// Records the clips at their poses, and what they do to each brick; `reach` as [`ClipBricks::record`] has it.

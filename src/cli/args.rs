@@ -1,11 +1,14 @@
 //! Flags that the programs share, and what they mean.
 
 use anyhow::{Context, Result};
+use cao_formats::feature::{FeatureSettings, LabelMap};
 use cao_formats::scene::VolumeSource;
 use cao_formats::{NoNumbers, Reading};
 use cao_model::METHODS;
 use cao_model::clip::Shape;
 use cao_model::error::shown_path;
+use cao_model::feature::Features;
+use cao_model::frame::Frame;
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::options::{KEYS, Key, Options};
@@ -16,7 +19,7 @@ use cao_model::volume::Volume;
 use clap::Args;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Display;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -93,6 +96,43 @@ impl Choices {
 
 fn no_numbers(text: &str) -> Result<NoNumbers, String> {
     NoNumbers::parse(text).ok_or_else(|| "expected a number or transparent".into())
+}
+
+/// Parts of the volume that are shown each for itself.
+#[derive(Args)]
+#[command(next_help_heading = "Features")]
+pub struct Parts {
+    /// Label map: a volume of whole numbers on the very grid of the input, 0 none, each other label a feature, 8 at most; names and colours
+    /// by the header of a .seg.nrrd
+    #[arg(long, value_name = "FILE")]
+    pub label: Option<PathBuf>,
+    /// Names and colours of its labels: lines of text, label name r g b, 0 to 255, or label descriptions of ITK-SNAP
+    #[arg(long, value_name = "FILE", requires = "label")]
+    pub label_table: Option<PathBuf>,
+    /// Features by a TOML file with the keys label and [[feature]]; a scene file is one [default: those of the scene]
+    #[arg(long, value_name = "FILE.toml")]
+    pub features: Option<PathBuf>,
+}
+
+impl Parts {
+    /// What the flags say, else what the scene does; a label map by its flag takes the place of the other.
+    pub fn settings(&self, scene: FeatureSettings) -> Result<FeatureSettings> {
+        let mut settings = match &self.features {
+            Some(path) => FeatureSettings::load(path)?,
+            None => scene,
+        };
+        if let Some(file) = &self.label {
+            settings.label = Some(LabelMap { file: file.clone(), table: self.label_table.clone() });
+        }
+        Ok(settings)
+    }
+
+    /// The features of a volume, in the order in which `frame` has it; prints warnings.
+    pub fn of(&self, scene: FeatureSettings, volume: &Volume, frame: Frame) -> Result<Features> {
+        let (features, warnings) = self.settings(scene)?.features(volume, frame)?;
+        warnings.iter().for_each(|warning| crate::say(&format!("warning: {warning}")));
+        Ok(features)
+    }
 }
 
 /// How occlusion is computed.

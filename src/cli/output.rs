@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::error::shown_path;
+use cao_model::feature::Features;
 use cao_model::options::Options;
 use cao_model::order::Layout;
 use cao_model::settings::Setup;
@@ -69,6 +70,25 @@ impl Out {
             "volume": name.as_ref().to_string_lossy(), "dims": dims, "spacing_mm": spacing,
             "type": volume.values.kind()
         }));
+    }
+
+    /// Features and how each is shown; nothing where there are none.
+    pub fn features(&mut self, features: &Features) {
+        if features.is_empty() {
+            return;
+        }
+        let said = features.list.iter().map(|feature| {
+            let scale =
+                if feature.scale == 1.0 { String::new() } else { format!(" times {}", feature.scale) };
+            let (hidden, spared) =
+                (if feature.visible { "" } else { " hidden" }, if feature.spared { " spared" } else { "" });
+            format!("{}{scale}{hidden}{spared}", feature.name)
+        });
+        self.line(format!("features  {}", said.collect::<Vec<_>>().join(", ")));
+        let list = features.list.iter().map(|feature| {
+            json!({ "name": feature.name, "visible": feature.visible, "opacity": feature.scale, "spared": feature.spared })
+        });
+        self.json(json!({ "features": list.collect::<Vec<_>>() }));
     }
 
     /// How occlusion was computed.

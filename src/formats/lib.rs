@@ -8,6 +8,7 @@ mod binary;
 #[cfg(feature = "dicom")]
 mod dicom;
 pub mod error;
+pub mod feature;
 pub mod file;
 mod foreign;
 mod grid;

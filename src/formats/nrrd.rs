@@ -379,6 +379,18 @@ impl<'a> Header<'a> {
     }
 }
 
+/// The free keys of a header, `key:=value`, in their order.
+pub(crate) fn keys(path: &Path) -> Result<Vec<(String, String)>> {
+    let mut lines = Lines::open(path)?;
+    let mut keys = Vec::new();
+    while let Some(line) = lines.next()?.filter(|line| !line.is_empty()) {
+        if let (Some((key, value)), Some((_, None))) = (line.split_once(":="), split(&line)) {
+            keys.push((key.into(), value.into()));
+        }
+    }
+    Ok(keys)
+}
+
 /// `field: value`, or `key:=value` with no value returned, because keys are free and mean nothing here.
 fn split(line: &str) -> Option<(&str, Option<&str>)> {
     let (name, value) = line.split_once(':')?;

@@ -22,6 +22,9 @@
 //!     rotate_deg = [0, 45, 0]          # about the fixed axes x, then y, then z
 //!     scale = 40                       # or one number an axis: [40, 40, 20]
 //!
+//!     ## label = "seg.nrrd"             # parts of the volume, by a label map or by values, and how each is shown: see [`feature`](crate::feature)
+//!     ## [[feature]]
+//!
 //!     [occlusion]
 //!     method = "rays"                  # rays by brick, where opacities change; "cao": rays, where clips change; "lao": all rays
 //!     rays = "spiral:50"               # any even number up to 254; "6" "14w" "26w" "50w", weighted; 14 26 54, equal weights, as the paper's
@@ -77,6 +80,7 @@ use glam::Vec3;
 use serde::Deserialize;
 use toml::Value;
 
+use crate::feature::FeatureSettings;
 use crate::reading::{NoNumbers, Reading};
 use crate::toml_value::{in_line, number, parse_colour, shown};
 use crate::{Error, Result, file, obj, transfer};
@@ -109,6 +113,8 @@ pub struct Scene {
     pub transfer: TransferSource,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are solids.
     pub clips: Vec<Clip>,
+    /// Parts of the volume; see [`FeatureSettings::features`].
+    pub features: FeatureSettings,
     /// Ambient occlusion; see [`OcclusionSettings::setup`].
     pub occlusion: OcclusionSettings,
     /// The eyes; see [`Stereo::rig`].
@@ -353,6 +359,7 @@ impl Scene {
             frame: Frame::default(),
             transfer: TransferSource::Preset("auto".into()),
             clips: Vec::new(),
+            features: FeatureSettings::default(),
             occlusion: OcclusionSettings::default(),
             stereo: Stereo::default(),
             image: ImageSettings::default(),
@@ -395,6 +402,7 @@ impl Scene {
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
             clips: clips.map(|(i, clip)| clip.read(&format!("clip[{i}]"), base)).collect::<Result<_>>()?,
+            features: FeatureSettings::from_keys(file.label, file.feature, base)?,
             occlusion: file.occlusion.read()?,
             stereo: file.stereo.read()?,
             image: file.image.read()?,
@@ -423,6 +431,9 @@ struct SceneFile {
     transfer: Option<Value>,
     #[serde(default)]
     clip: Vec<ClipFile>,
+    label: Option<Value>,
+    #[serde(default)]
+    feature: Vec<toml::Table>,
     #[serde(default)]
     occlusion: OcclusionFile,
     #[serde(default)]

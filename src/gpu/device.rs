@@ -336,9 +336,9 @@ impl Gpu {
         self.may(format) && feature::stores(&self.0.instance, self.0.physical, format.vk())
     }
 
-    /// Whether this format may be used at all: `R16_UNORM` is optional.
+    /// Whether this format may be used at all: those of 16-bit UNORM are optional.
     fn may(&self, format: Format) -> bool {
-        !self.0.plain || format != Format::R16Unorm
+        !self.0.plain || !matches!(format, Format::R16Unorm | Format::Rgba16Unorm)
     }
 
     /// Whether all that is optional is done without ([`OpenOptions::plain`]).

@@ -29,6 +29,7 @@ impl VulkanFormat for Format {
             Format::Bgra8Unorm => vk::Format::B8G8R8A8_UNORM,
             Format::Bgra8Srgb => vk::Format::B8G8R8A8_SRGB,
             Format::A2b10g10r10Unorm => vk::Format::A2B10G10R10_UNORM_PACK32,
+            Format::Rgba16Unorm => vk::Format::R16G16B16A16_UNORM,
             Format::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
             Format::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
             Format::D16Unorm => vk::Format::D16_UNORM,

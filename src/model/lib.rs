@@ -6,6 +6,7 @@
 pub mod builtin;
 pub mod clip;
 pub mod error;
+pub mod feature;
 pub mod fit;
 pub mod frame;
 pub mod look;

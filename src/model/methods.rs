@@ -9,6 +9,8 @@ use crate::{Error, Result};
 /// A method of ambient occlusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
+    /// Local ambient occlusion of each feature by itself; equal to computing everything bit for bit.
+    FeatureDriven,
     /// Local ambient occlusion of the clipped volume, every voxel.
     Lao,
     /// Contextual: only voxels that the clip affects; equal to [`Method::Lao`] bit for bit.
@@ -48,6 +50,21 @@ pub struct Entry {
 
 /// Every method, the one to use first last.
 pub static METHODS: &[Entry] = &[
+    Entry {
+        method: Method::FeatureDriven,
+        name: "fdao",
+        title: "Feature-driven ambient occlusion",
+        what: "rays of each feature by itself, of the bricks within reach of what changed",
+        source: "fdAO §4, eq. (5), (6)",
+        rays: RaySet::Spiral(50),
+        quadratures: &Quadrature::BRICK,
+        // Where there are no features its values are those of `rays`, whatever the option.
+        sets: &[RaySet::Spiral(50)],
+        options: &["combine"],
+        variants: &[&[]],
+        contextual: true,
+        same_values_as: Method::FeatureDriven,
+    },
     Entry {
         method: Method::Lao,
         name: "lao",
@@ -174,7 +191,7 @@ mod tests {
 
     #[test]
     fn every_method_has_one_entry_and_is_found_by_its_name() {
-        for method in [Method::Lao, Method::Cao, Method::Rays] {
+        for method in [Method::FeatureDriven, Method::Lao, Method::Cao, Method::Rays] {
             assert_eq!(METHODS.iter().filter(|entry| entry.method == method).count(), 1);
             assert_eq!(Method::parse(method.name()), Ok(method));
         }

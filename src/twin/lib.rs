@@ -8,6 +8,7 @@
 pub mod cast;
 pub mod clip;
 pub mod draw;
+pub mod features;
 pub mod field;
 pub mod measure;
 pub mod rays;

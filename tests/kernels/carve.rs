@@ -9,6 +9,7 @@ use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
+use cao::field::features::{Classes, FeatureSet};
 use cao::field::near::FAR;
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
@@ -17,6 +18,7 @@ use cao::field::volume_image;
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::random::Random;
 use cao_model::clip::Clip;
+use cao_model::feature::{Feature, Features};
 use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::transfer::TransferFunction;
@@ -31,7 +33,9 @@ struct Bench<'a> {
     field: Field,
     set: ClipSet,
     half_mm: f32,
+    function: TransferFunction,
     transfer: TransferBuffer,
+    features: FeatureSet,
     words: [Buffer; 3],
     occupancy: Buffer,
     contact: Buffer,
@@ -56,7 +60,9 @@ impl<'a> Bench<'a> {
         Self {
             set: ClipSet::new(gpu).unwrap(),
             half_mm: 0.5 * size_mm(grid).length(),
+            function: identity(),
             transfer: TransferBuffer::new(gpu).unwrap(),
+            features: FeatureSet::new(gpu, &field, Features::NONE).unwrap(),
             words: [zeros("now"), zeros("before"), zeros("for classify")],
             occupancy: zeros("occupancy"),
             contact: zeros("contact"),
@@ -79,7 +85,11 @@ impl<'a> Bench<'a> {
         clips: &[Clip],
         samples: AntiAliasing,
     ) {
-        let Kernels { classify, clip_bricks, carve, opacity, occupancy, peel, dilate } = kernels;
+        let Kernels { classify, clip_bricks, carve, opacity, occupancy, peel, dilate, classes } = kernels;
+        if let Some(transfer) = transfer {
+            self.function = transfer.clone();
+        }
+        let (field, by) = self.features.opacities().unwrap_or((&self.field, &self.transfer));
         self.set = self.set.planned(self.gpu, clips, Some(1.0), self.half_mm, MAPS).unwrap();
         self.set.make(self.gpu, peel, dilate).unwrap();
         let between = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
@@ -89,15 +99,17 @@ impl<'a> Bench<'a> {
             rec.fill(&self.change, 0, self.change.bytes(), FAR).unwrap();
             if let Some(transfer) = transfer {
                 self.transfer.record(rec, transfer).unwrap();
-                occupancy.record(rec, &self.field, &self.transfer, &self.occupancy).unwrap();
+                self.features.record(rec, classes, &self.field, transfer, &self.transfer).unwrap();
+                occupancy.record(rec, field, by, &self.features, &self.occupancy).unwrap();
             }
-            opacity.record(rec, &self.field, &self.transfer, &self.full).unwrap();
+            opacity.record(rec, field, by, &self.full).unwrap();
             self.set.record(rec, clips, self.half_mm).unwrap();
             clip_bricks.record(rec, &self.field, &self.set, 0.0, &self.words[0]).unwrap();
             clip_bricks.record(rec, &self.field, &self.set, 1.0, &self.words[2]).unwrap();
             rec.barrier(&[Access::StorageWrite, Access::TransferWrite], &between);
             let b = Bindings {
-                transfer: &self.transfer,
+                transfer: by,
+                features: &self.features,
                 clips: &self.set,
                 clip_bricks: &self.words[0],
                 clip_bricks_before: &self.words[1],
@@ -107,10 +119,12 @@ impl<'a> Bench<'a> {
                 list: &self.list,
                 opacity: &self.opacity,
             };
-            carve.record(rec, &self.field, samples, transfer.is_some(), b).unwrap();
-            let (set, words) = (&self.set, &self.words[2]);
+            carve.record(rec, field, samples, transfer.is_some(), b).unwrap();
+            let (set, words, features) = (&self.set, &self.words[2], &self.features);
             let (full, clipped, mask) = (&self.full, &self.clipped, &self.mask);
-            classify.record(rec, &self.field, set, samples, 1.0, false, words, full, clipped, mask).unwrap();
+            classify
+                .record(rec, field, features, set, samples, 1.0, false, words, full, clipped, mask)
+                .unwrap();
         });
     }
 
@@ -127,6 +141,7 @@ struct Kernels {
     occupancy: Occupancy,
     peel: Peel,
     dilate: Dilate,
+    classes: Classes,
 }
 
 impl Kernels {
@@ -139,6 +154,7 @@ impl Kernels {
             occupancy: Occupancy::new(gpu).unwrap(),
             peel: Peel::new(gpu).unwrap(),
             dilate: Dilate::new(gpu).unwrap(),
+            classes: Classes::new(gpu).unwrap(),
         }
     }
 }
@@ -157,6 +173,19 @@ fn opacity_in_place_equals_classification_after_every_edit_and_changes_are_found
         let mut bench = Bench::new(&gpu, &grid, values);
         let mut before = bench.opacity();
         for step in 0..40 {
+            // From the middle on some voxels are of features, some of which are hidden, weaker or spared by clips.
+            if step >= 20 && step % 10 == 0 {
+                let mut feature = |k: usize| Feature {
+                    visible: random.below(4) > 0,
+                    scale: random.between(0.2, 2.0),
+                    spared: (step / 10 + k) % 2 == 0,
+                    ..Feature::new(k.to_string())
+                };
+                let list = (0..3).map(&mut feature).collect();
+                let labels = (0..grid.len()).map(|_| random.below(4) as u8).collect();
+                let features = Features::by_labels(list, grid.dims, labels).unwrap();
+                bench.features = FeatureSet::new(&gpu, &bench.field, features).unwrap();
+            }
             let transfer = (step % 5 == 0).then(|| {
                 let (low, top) = (random.between(0.0, 0.7), random.between(0.2, 1.0));
                 TransferFunction::new(vec![[low, 0.0], [low + 0.2, top]], vec![[0.0, 1.0, 1.0, 1.0]], None)

@@ -51,7 +51,7 @@ impl<'a> Bench<'a> {
         maps: MapSettings,
     ) -> Found {
         let Kernels { gpu, classify, clip_bricks, .. } = &self.0;
-        let Clipped { field, set, reach } = self.0.clipped(grid, clips, occlusion, maps);
+        let Clipped { field, features, set, reach } = self.0.clipped(grid, clips, occlusion, maps);
         let full = float_image(gpu, &field, full);
         let opacity = volume_image(gpu, "opacity", &field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", &field, Format::R8Uint).unwrap();
@@ -68,7 +68,7 @@ impl<'a> Bench<'a> {
             );
             let literal = maps.literal;
             classify
-                .record(rec, &field, &set, samples, reach, literal, &words, &full, &opacity, &mask)
+                .record(rec, &field, &features, &set, samples, reach, literal, &words, &full, &opacity, &mask)
                 .unwrap();
         });
         Found {

@@ -3,12 +3,14 @@
 
 use crate::clipping::{Clipped, Kernels};
 use cao::clip::clip_bricks::{ClipBricks, UNKNOWN};
+use cao::field::features::FeatureSet;
 use cao::field::volume_image;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::exactness;
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::feature::{Feature, Features};
 use cao_model::methods::Method;
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::AntiAliasing;
@@ -50,16 +52,24 @@ impl<'a> Bench<'a> {
 
     fn scene(&self, grid: &Grid, clips: &[Clip], radius_mm: f32, maps: MapSettings) -> Scene {
         let occlusion = Occlusion { radius_mm, ..Occlusion::paper(grid.min_spacing()) };
-        let clipped = self.0.clipped(grid, clips, &occlusion, maps);
+        let mut clipped = self.0.clipped(grid, clips, &occlusion, maps);
         // Without zeros: what is hidden must be seen to be.
         let mut random = Random::new(1);
         let full: Vec<f32> = (0..grid.len()).map(|_| random.between(0.1, 1.0)).collect();
         let full = float_image(self.0.gpu, &clipped.field, &full);
+        // An odd number of clips leaves every second voxel whole.
+        if clips.len() % 2 == 1 {
+            let list = vec![Feature { spared: true, ..Feature::new("spared") }];
+            let labels = (0..grid.len()).map(|i| (i % 2) as u8).collect();
+            let features = Features::by_labels(list, grid.dims, labels).unwrap();
+            clipped.features = FeatureSet::new(self.0.gpu, &clipped.field, features).unwrap();
+            run(self.0.gpu, |rec| clipped.features.record_table(rec, &clipped.field).unwrap());
+        }
         Scene { clipped, full, literal: maps.literal }
     }
 
     fn bricks(&self, scene: &Scene) -> Buffer {
-        let Clipped { field, set, reach } = &scene.clipped;
+        let Clipped { field, set, reach, .. } = &scene.clipped;
         let words = ClipBricks::buffer(self.0.gpu, field).unwrap();
         run(self.0.gpu, |rec| self.0.clip_bricks.record(rec, field, set, *reach, &words).unwrap());
         words
@@ -73,7 +83,7 @@ impl<'a> Bench<'a> {
 
     fn classify(&self, scene: &Scene, words: &Buffer, samples: AntiAliasing) -> Found {
         let Kernels { gpu, classify, .. } = &self.0;
-        let Scene { clipped: Clipped { field, set, reach }, full, literal } = scene;
+        let Scene { clipped: Clipped { field, features, set, reach }, full, literal } = scene;
         let count = &classify.count;
         let opacity = volume_image(gpu, "opacity", field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", field, Format::R8Uint).unwrap();
@@ -83,7 +93,7 @@ impl<'a> Bench<'a> {
             rec.fill(count, 0, count.bytes(), 0).unwrap();
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
             classify
-                .record(rec, field, set, samples, *reach, *literal, words, full, &opacity, &mask)
+                .record(rec, field, features, set, samples, *reach, *literal, words, full, &opacity, &mask)
                 .unwrap();
         });
         Found {

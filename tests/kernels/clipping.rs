@@ -6,8 +6,10 @@ use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
 use cao::field::Field;
+use cao::field::features::FeatureSet;
 use cao_gpu::Gpu;
 use cao_model::clip::Clip;
+use cao_model::feature::Features;
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::MapSettings;
 use cao_testing::{blank, run, size_mm};
@@ -24,6 +26,7 @@ pub struct Kernels<'a> {
 /// Clips on the device in front of a volume.
 pub struct Clipped {
     pub field: Field,
+    pub features: FeatureSet,
     pub set: ClipSet,
     pub reach: f32,
 }
@@ -49,6 +52,6 @@ impl<'a> Kernels<'a> {
         let mut set = none.planned(gpu, clips, Some(radius), half_mm, maps).unwrap();
         set.make(gpu, &self.peel, &self.dilate).unwrap();
         run(gpu, |rec| set.record(rec, clips, half_mm).unwrap());
-        Clipped { field, set, reach }
+        Clipped { features: FeatureSet::new(gpu, &field, Features::NONE).unwrap(), field, set, reach }
     }
 }

@@ -1,10 +1,12 @@
 //! The kernel `occupancy` against its twin.
 
 use cao::field::Field;
+use cao::field::features::{Classes, FeatureSet};
 use cao::field::occupancy::Occupancy;
 use cao::field::transfer::TransferBuffer;
 use cao_gpu::{Access, BufferUse, Gpu};
 use cao_measure::random::Random;
+use cao_model::feature::{Feature, Features};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::volume::Volume;
@@ -13,16 +15,29 @@ use cao_twin as twin;
 use cao_twin::Grid;
 
 fn on_device(gpu: &Gpu, kernel: &Occupancy, volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
+    words(gpu, kernel, volume, transfer, Features::NONE).into_iter().map(|word| word != 0).collect()
+}
+
+fn words(
+    gpu: &Gpu,
+    kernel: &Occupancy,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    features: Features,
+) -> Vec<u32> {
     let field = Field::upload(gpu, volume).unwrap();
     let points = TransferBuffer::new(gpu).unwrap();
     let occupancy = gpu.buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device).unwrap();
+    let features = FeatureSet::new(gpu, &field, features).unwrap();
+    let classes = Classes::new(gpu).unwrap();
     run(gpu, |rec| {
         points.record(rec, transfer).unwrap();
+        features.record(rec, &classes, &field, transfer, &points).unwrap();
         rec.barrier(&[], &[Access::StorageWrite]);
-        kernel.record(rec, &field, &points, &occupancy).unwrap();
+        let (field, points) = features.opacities().unwrap_or((&field, &points));
+        kernel.record(rec, field, points, &features, &occupancy).unwrap();
     });
-    let content: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &occupancy));
-    content.into_iter().map(|v| v != 0).collect()
+    bytemuck::pod_collect_to_vec(&read_buffer(gpu, &occupancy))
 }
 
 fn twin(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
@@ -94,6 +109,46 @@ fn no_visible_brick_is_skipped() {
             assert!(found || !expected, "{} brick {brick} turn {turn}", volume.values.kind());
         }
     }
+    drop(kernel);
+    close(gpu);
+}
+
+/// With features: of opacities after them, and a bit more where clips leave some.
+#[test]
+fn hidden_features_show_nothing_and_what_clips_leave_is_marked() {
+    let gpu = open();
+    let kernel = Occupancy::new(&gpu).unwrap();
+    let mut random = Random::new(7);
+    let mut seen = [0; 4];
+    for grid in grids() {
+        for turn in 0..4 {
+            let volume = volume_of(&grid, opacities(&mut random, &grid, 1.0));
+            // Few voxels belong to a feature that shows.
+            let label = |random: &mut Random| {
+                if random.below(1 << (3 * turn)) == 0 { 1 + random.below(2) } else { 3 }
+            };
+            let labels = (0..grid.len()).map(|_| label(&mut random) as u8).collect();
+            let list = vec![
+                Feature::new("plain"),
+                Feature { spared: true, ..Feature::new("spared") },
+                Feature { visible: false, spared: true, ..Feature::new("hidden") },
+            ];
+            let features = Features::by_labels(list, grid.dims, labels).unwrap();
+            let shown = twin::field::features::classified(&volume, &identity(), &features);
+            let spared = twin::field::features::spared(&volume, &features);
+            let left: Vec<f32> = shown.iter().zip(spared).map(|(a, s)| if s { *a } else { 0.0 }).collect();
+            let of = |values: &[f32]| twin::field::occupancy::occupancy(&grid, values, &identity());
+            let expected: Vec<u32> = of(&shown)
+                .into_iter()
+                .zip(of(&left))
+                .map(|(a, b)| u32::from(a) | u32::from(b) << 1)
+                .collect();
+            let found = words(&gpu, &kernel, &volume, &identity(), features);
+            assert_eq!(found, expected, "{:?} turn {turn}", grid.dims);
+            found.iter().for_each(|word| seen[*word as usize] += 1);
+        }
+    }
+    assert!(seen[0] > 5 && seen[1] > 5 && seen[3] > 20, "{seen:?}");
     drop(kernel);
     close(gpu);
 }

@@ -13,6 +13,7 @@ use cao::draw::eyes::FrameBuffer;
 use cao::draw::picture::Picture;
 use cao::draw::raycast::{Bindings, Raycast};
 use cao::field::Field;
+use cao::field::features::{Classes, FeatureSet};
 use cao::field::occupancy::Occupancy;
 use cao::field::opacity::Opacity;
 use cao::field::transfer::TransferBuffer;
@@ -21,6 +22,7 @@ use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, ImageDe
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::feature::{Feature, Features};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -41,7 +43,7 @@ use cao_twin::clip::clips::{ClipField, Dilation, Maps};
 use glam::{Quat, Vec3};
 
 /// Width and height of an eye's picture; neither is a multiple of a tile or a workgroup.
-const SIZE: [u32; 2] = [47, 41];
+pub const SIZE: [u32; 2] = [47, 41];
 
 /// What a colour component (0 ... about 1) of a pixel may be off by. The kernel snaps positions in V_AO to 1/256 voxel, over
 /// which a factor shown twice over changes by up to 2 · √3/512; the opacities of some hundred samples round to f32 and
@@ -58,7 +60,7 @@ fn depth_tolerance(view: &View, step_mm: f32, nearest_mm: f32) -> f32 {
 /// and f64 may take another side, and a whole sample differs.
 const GRAZING: f32 = 0.02;
 
-fn setup(maps: MapSettings) -> Setup {
+pub fn setup(maps: MapSettings) -> Setup {
     Setup {
         occlusion: Occlusion {
             rays: RaySet::R14,
@@ -75,7 +77,7 @@ fn setup(maps: MapSettings) -> Setup {
     }
 }
 
-const MAPS: MapSettings = MapSettings { resolution: 96, cells: 32, pairs: 4, literal: false };
+pub const MAPS: MapSettings = MapSettings { resolution: 96, cells: 32, pairs: 4, literal: false };
 
 /// Both eyes of the renderer's scene by the twin, from the device's own V_AO.
 fn twin(
@@ -96,6 +98,7 @@ fn twin(
     let frame = twin::draw::raycast::Frame {
         grid,
         values: &values,
+        parts: None,
         transfer,
         reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
         ambient: &ambient,
@@ -115,7 +118,7 @@ fn assert_finite(image: &StereoImage, context: &str) {
 }
 
 /// Compares both eyes; `nearest_mm` is the depth of the nearest thing that could be seen.
-fn compare(
+pub fn compare(
     found: &StereoImage,
     expected: &[twin::draw::raycast::Image; 2],
     views: &[View; 2],
@@ -152,7 +155,7 @@ fn in_floats(volume: &Volume) -> Volume {
 }
 
 /// Outside, looking at the volume as a scene file's rig does.
-fn framing(volume: &Volume, azimuth: f32, elevation: f32) -> [View; 2] {
+pub fn framing(volume: &Volume, azimuth: f32, elevation: f32) -> [View; 2] {
     let rig = StereoRig::framing(volume.size_mm(), azimuth, elevation);
     let far = 3.0 * rig.position.length();
     rig.views(SIZE[0] as f32 / SIZE[1] as f32, 0.02 * far, far).unwrap()
@@ -447,6 +450,7 @@ struct Stages {
     volumes: Volumes,
     occupancy: Buffer,
     transfer: TransferBuffer,
+    features: FeatureSet,
     clips: ClipSet,
     frame: FrameBuffer,
     raycast: Raycast,
@@ -455,7 +459,13 @@ struct Stages {
 }
 
 impl Stages {
-    fn new(gpu: &Gpu, volume: &Volume, transfer: &TransferFunction, clips: &[Clip]) -> Self {
+    fn new(
+        gpu: &Gpu,
+        volume: &Volume,
+        transfer: &TransferFunction,
+        clips: &[Clip],
+        features: Features,
+    ) -> Self {
         let field = Field::upload(gpu, volume).unwrap();
         let stages = Self {
             volumes: Volumes::new(gpu, &field).unwrap(),
@@ -463,6 +473,7 @@ impl Stages {
                 .buffer("occupancy", 4 * u64::from(field.brick_count()), BufferUse::Device)
                 .unwrap(),
             transfer: TransferBuffer::new(gpu).unwrap(),
+            features: FeatureSet::new(gpu, &field, features).unwrap(),
             clips: ClipSet::new(gpu).unwrap(),
             frame: FrameBuffer::new(gpu).unwrap(),
             raycast: Raycast::new(gpu, &field).unwrap(),
@@ -479,12 +490,15 @@ impl Stages {
         stages.clips = stages.clips.planned(gpu, clips, Some(2.0), 50.0, MAPS).unwrap();
         stages.clips.make(gpu, &peel, &dilate).unwrap();
         let volumes = &stages.volumes;
+        let classes = Classes::new(gpu).unwrap();
         run(gpu, |rec| {
             stages.transfer.record(rec, transfer).unwrap();
+            stages.features.record(rec, &classes, &stages.field, transfer, &stages.transfer).unwrap();
+            let (field, transfer) = stages.opacities();
             stages.clips.record(rec, clips, 50.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
-            opacity.record(rec, &stages.field, &stages.transfer, &volumes.full_opacity).unwrap();
-            occupancy.record(rec, &stages.field, &stages.transfer, &stages.occupancy).unwrap();
+            opacity.record(rec, field, transfer, &volumes.full_opacity).unwrap();
+            occupancy.record(rec, field, transfer, &stages.features, &stages.occupancy).unwrap();
             clip_bricks.record(rec, &stages.field, &stages.clips, 2.0, &volumes.clip_bricks).unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
             distance
@@ -493,6 +507,10 @@ impl Stages {
             bounds.record(rec, &stages.field, &stages.distances, &stages.bounds).unwrap();
         });
         stages
+    }
+
+    fn opacities(&self) -> (&Field, &TransferBuffer) {
+        self.features.opacities().unwrap_or((&self.field, &self.transfer))
     }
 
     /// How many bricks have opacity that the clips hide whole.
@@ -530,9 +548,12 @@ impl Stages {
         let Picture { colour, depth } = &picture;
         let distances = buffer(gpu, "words", bytemuck::cast_slice(distances));
         let bounds = buffer(gpu, "bounds", bytemuck::bytes_of(&bounds));
+        let (field, transfer) = self.opacities();
         let bindings = Bindings {
-            field: &self.field,
-            transfer: &self.transfer,
+            field,
+            transfer,
+            values: &self.field.volume,
+            features: &self.features,
             ambient: &self.volumes.ambient,
             distances: &distances,
             bounds: &bounds,
@@ -547,7 +568,7 @@ impl Stages {
         run(gpu, |rec| {
             rec.discard(colour);
             rec.discard(depth);
-            self.frame.record(rec, &self.field, views.into(), look, 1.0).unwrap();
+            self.frame.record(rec, field, views.into(), look, 1.0).unwrap();
             rec.barrier(&[], &[Access::StorageWrite]);
             let band = Band::whole(SIZE);
             self.raycast.record(rec, bindings, &picture, band, 0..band.tiles(), false).unwrap();
@@ -571,8 +592,9 @@ fn leap(word: u32) -> u32 {
     word & 0xff_ffff
 }
 
-/// Volumes and clips that leave much to leap over: empty, and wholly clipped.
-fn sparse_scenes() -> Vec<(&'static str, Volume, Vec<Clip>)> {
+/// Volumes and clips that leave much to leap over: empty, and wholly clipped; and features, of which some are hidden and some are left
+/// whole by clips.
+fn sparse_scenes() -> Vec<(&'static str, Volume, Vec<Clip>, Features)> {
     let clip = |shape, mode, at: [f32; 3], scale| {
         let pose = Pose {
             translate_mm: at.into(),
@@ -590,13 +612,21 @@ fn sparse_scenes() -> Vec<(&'static str, Volume, Vec<Clip>)> {
     let mut flat = clip(Shape::Plane, Mode::Remove, [0.0, 0.0, 15.49 - 12.5], 1.0);
     flat.pose.rotate_deg = Vec3::ZERO;
     let volume = |name, dims, spacing| builtin_box(name, dims, spacing).unwrap();
+    let part = |name: &str, visible, spared| Feature { visible, spared, ..Feature::new(name) };
+    let parts = Features::by_intervals(vec![
+        (part("flesh", false, false), [30.0, 160.0]),
+        (part("core", true, true), [160.0, 190.0]),
+        (part("seeds", true, false), [225.0, 256.0]),
+    ]);
+    let none = Features::NONE;
     vec![
-        ("flat", volume("engine", [40, 33, 26], [1.0; 3]), vec![flat]),
-        ("skeleton", volume("skeleton", [41, 33, 50], [1.0, 1.0, 0.8]), vec![tube.clone()]),
-        ("engine", volume("engine", [40, 33, 26], [1.0; 3]), vec![tube.clone(), slab.clone()]),
-        ("fruit", volume("fruit", [44, 40, 41], [1.0; 3]), vec![slab, hole]),
-        ("block", volume("engine", [48, 48, 40], [1.0; 3]), vec![ball]),
-        ("voxel", volume("voxel", [33; 3], [1.0; 3]), vec![tube]),
+        ("flat", volume("engine", [40, 33, 26], [1.0; 3]), vec![flat], none.clone()),
+        ("skeleton", volume("skeleton", [41, 33, 50], [1.0, 1.0, 0.8]), vec![tube.clone()], none.clone()),
+        ("engine", volume("engine", [40, 33, 26], [1.0; 3]), vec![tube.clone(), slab.clone()], none.clone()),
+        ("fruit", volume("fruit", [44, 40, 41], [1.0; 3]), vec![slab.clone(), hole], none.clone()),
+        ("block", volume("engine", [48, 48, 40], [1.0; 3]), vec![ball], none.clone()),
+        ("voxel", volume("voxel", [33; 3], [1.0; 3]), vec![tube], none),
+        ("parts", volume("fruit", [44, 40, 41], [1.0; 3]), vec![slab], parts.unwrap()),
     ]
 }
 
@@ -640,9 +670,9 @@ fn leaping_over_empty_and_clipped_space_changes_no_bit() {
     let gpu = open();
     let mut random = Random::new(SEED);
     let mut hidden = 0;
-    for (name, volume, clips) in sparse_scenes() {
+    for (name, volume, clips, features) in sparse_scenes() {
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-        let stages = Stages::new(&gpu, &volume, &transfer, &clips);
+        let stages = Stages::new(&gpu, &volume, &transfer, &clips, features);
         let words = stages.distances(&gpu);
         let empty = words.iter().filter(|&&word| leap(word) > 0).count();
         assert!(empty > 10, "{name}: only {empty} bricks to leap over");
@@ -672,9 +702,9 @@ fn bounds_change_no_bit_and_wrong_ones_are_caught() {
     let gpu = open();
     let mut random = Random::new(SEED);
     let (mut smaller, mut caught) = (0, [0; 6]);
-    for (name, volume, clips) in sparse_scenes() {
+    for (name, volume, clips, features) in sparse_scenes() {
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-        let stages = Stages::new(&gpu, &volume, &transfer, &clips);
+        let stages = Stages::new(&gpu, &volume, &transfer, &clips, features);
         let (words, bounds) = (stages.distances(&gpu), stages.bounds(&gpu));
         let bricks = stages.field.bricks();
         smaller += (0..6).filter(|&i| bounds[i] < bricks[i % 3]).count();
@@ -706,9 +736,9 @@ fn a_wrong_distance_is_caught() {
     let gpu = open();
     let mut random = Random::new(32);
     let (mut too_far, mut not_asked) = (0, 0);
-    for (_, volume, clips) in sparse_scenes() {
+    for (_, volume, clips, features) in sparse_scenes() {
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-        let stages = Stages::new(&gpu, &volume, &transfer, &clips);
+        let stages = Stages::new(&gpu, &volume, &transfer, &clips, features);
         let words = stages.distances(&gpu);
         let further = |word: &u32| if leap(*word) == 0 { *word } else { word + 1 };
         let further: Vec<u32> = words.iter().map(further).collect();

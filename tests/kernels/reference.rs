@@ -211,6 +211,7 @@ impl Scene {
         Frame {
             grid: self.grid,
             values: &self.values,
+            parts: None,
             transfer: &self.transfer,
             reference_mm: 1.0,
             ambient,

@@ -79,7 +79,7 @@ fn setup() -> impl Strategy<Value = Setup> {
         RaySet::Spiral(255),
     ]);
     let method = prop_oneof![
-        4 => select(vec![Method::Lao, Method::Cao, Method::Rays]).prop_map(|m| (m, m.quadrature())),
+        4 => select(vec![Method::FeatureDriven, Method::Lao, Method::Cao, Method::Rays]).prop_map(|m| (m, m.quadrature())),
         1 => (select(vec![Method::Cao, Method::Rays]), select(Quadrature::ALL.to_vec())),
     ];
     let maps = (

@@ -5,6 +5,7 @@ use cao_gpu::Gpu;
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::Clip;
+use cao_model::feature::{Feature, Features};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::Options;
@@ -31,6 +32,9 @@ fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
     }
 }
 
+/// Kinds of edits.
+const KINDS: u64 = 12;
+
 /// A scene as an engine holds it, so that a renderer can be made for it anew.
 #[derive(Clone)]
 pub struct Scene {
@@ -38,6 +42,7 @@ pub struct Scene {
     pub transfer: TransferFunction,
     pub setup: Setup,
     pub clips: Vec<Clip>,
+    pub features: Features,
 }
 
 impl Scene {
@@ -45,23 +50,24 @@ impl Scene {
         let mut renderer =
             Renderer::new(gpu, &self.volume, self.transfer.clone(), self.setup, COLOUR).unwrap();
         renderer.set_clips(&self.clips).unwrap();
+        renderer.set_features(self.features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         renderer
     }
 
     /// One edit, done to the scene and to the renderer.
     pub fn edit(&mut self, random: &mut Random, renderer: &mut Renderer) -> String {
-        let kind = random.below(10);
+        let kind = random.below(KINDS);
         self.edit_of(kind, random, renderer)
     }
 
     /// One that never uses the queue, unless a clip mesh is new.
     pub fn edit_recorded(&mut self, random: &mut Random, renderer: &mut Renderer) -> String {
-        let kind = [0, 2, 7][random.below(3) as usize];
+        let kind = [0, 2, 7, 10][random.below(4) as usize];
         self.edit_of(kind, random, renderer)
     }
 
-    /// One whose kind is a number below 10; some of 6 are another method and back, which makes that method.
+    /// One whose kind is a number below [`KINDS`]; some of 6 are another method and back, which makes that method.
     pub fn edit_of(&mut self, kind: u64, random: &mut Random, renderer: &mut Renderer) -> String {
         let pick = |random: &mut Random, n: usize| random.below(n as u64) as usize;
         match kind {
@@ -148,6 +154,40 @@ impl Scene {
                 renderer.set_setup(self.setup).unwrap();
                 format!("{} and back", method.name())
             }
+            // How a feature is shown; where there is none, nothing changes.
+            10 => {
+                let count = self.features.list.len();
+                if count > 0 {
+                    let feature = &mut self.features.list[pick(random, count)];
+                    match random.below(3) {
+                        0 => feature.visible = !feature.visible,
+                        1 => feature.scale = random.between(0.0, 2.0),
+                        _ => feature.spared = !feature.spared,
+                    }
+                }
+                renderer.set_features(self.features.clone()).unwrap();
+                format!("{:?}", self.features.list)
+            }
+            // Other features: none, by intervals, or of boxes of voxels.
+            11 => {
+                let count = 1 + pick(random, Features::MOST);
+                let list = (0..count).map(|k| Feature { spared: k % 3 == 0, ..Feature::new(k.to_string()) });
+                let step = 256.0 / count as f32;
+                let interval = |k: usize| [k as f32 * step, (k as f32 + 0.9) * step];
+                self.features = match random.below(4) {
+                    0 => Features::NONE,
+                    1 | 2 => Features::by_intervals(list.zip((0..).map(interval)).collect()).unwrap(),
+                    _ => {
+                        let dims = self.volume.dims;
+                        let grid = grid_of(&self.volume);
+                        let label = |i| grid.voxel(i).iter().map(|c| c / 5).sum::<usize>() % (count + 1);
+                        let labels = (0..self.volume.len()).map(|i| label(i) as u8).collect();
+                        Features::by_labels(list.collect(), dims, labels).unwrap()
+                    }
+                };
+                renderer.set_features(self.features.clone()).unwrap();
+                format!("{} features", self.features.list.len())
+            }
             _ => {
                 let (shapes, size) = (shapes(), size_mm(&grid_of(&self.volume)));
                 let count = [0, 1, 1, 1, 2, 3, 5][pick(random, 7)];
@@ -191,7 +231,13 @@ pub fn scene_up_to(edge: u64, random: &mut Random, name: &str, method: Method) -
     let volume = Volume::new(dims, spacing, Values::U8(bytes)).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let radius = 4.0 * volume.min_spacing() as f32;
-    Scene { volume, transfer, setup: setup(method, RaySet::W14, radius), clips: Vec::new() }
+    Scene {
+        volume,
+        transfer,
+        setup: setup(method, RaySet::W14, radius),
+        clips: Vec::new(),
+        features: Features::NONE,
+    }
 }
 
 /// All opacities and ambient factors are those of a renderer made for this state, to the bit.

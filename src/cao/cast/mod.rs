@@ -34,7 +34,8 @@ fn unclipped<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject, changed: Chang
     }
     if changed.opacities {
         parts.push(Part::short(stages::OPACITY, |rec| {
-            k.opacity.record(rec, &on.field, &on.transfer_buffer, &v.full_opacity)?;
+            let (field, transfer) = on.opacities();
+            k.opacity.record(rec, field, transfer, &v.full_opacity)?;
             rec.barrier(&[Access::StorageWrite], &[Access::SampledRead]);
             Ok(())
         }));
@@ -53,6 +54,7 @@ fn classified<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
         k.classify.record(
             rec,
             &on.field,
+            &on.features,
             &on.clip_set,
             on.setup.anti_aliasing,
             reach,

@@ -1,7 +1,8 @@
 //! Opacity after transfer function and clips, in place, and which bricks changed (method.md §5.2, §6):
-//! `V_o(x) = C_visible/(N+9) · TF_o(V(x))` (CAO eq. (5)), stored to 1/65535.
+//! `V_o(x) = C_visible/(N+9) · TF_o(V(x))` (CAO eq. (5)), stored to 1/65535; of a voxel whose feature clips leave
+//! whole, `V_o(x) = TF_o(V(x))`.
 //!
-//! In: `volume`, `transfer`, the clips, the words of [`super::clip_bricks`] now and at the last edit, `occupancy`. In and out:
+//! In: `volume`, `transfer`, features, the clips, the words of [`super::clip_bricks`] now and at the last edit, `occupancy`. In and out:
 //! `opacity` V_o (3D r16unorm), `contact` (where each brick's opacity lies, 27 bits). Out: `change` (f32 a brick: 0 where an
 //! opacity changed, left alone elsewhere). Cost: nothing for bricks that no edit can have changed; two reads and a transfer function a
 //! voxel in the others, clip samples only where a clip's surface passes.
@@ -10,6 +11,7 @@ use crate::clip::clips::ClipSet;
 use crate::clip::positions;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
+use crate::field::features::FeatureSet;
 use crate::field::transfer::TransferBuffer;
 use crate::host::rows_over;
 use cao_gpu::Result;
@@ -22,6 +24,8 @@ use cao_model::settings::AntiAliasing;
 pub struct Bindings<'a> {
     /// Opacity and colour.
     pub transfer: &'a TransferBuffer,
+    /// Which voxels clips leave whole.
+    pub features: &'a FeatureSet,
     /// The clips.
     pub clips: &'a ClipSet,
     /// What they do to whole bricks.
@@ -97,6 +101,8 @@ impl Carve {
         let binds = kernel::MainBindings {
             volume: &field.volume,
             transfer: &b.transfer.buffer,
+            features: &b.features.table,
+            feature_index: &b.features.index,
             clips: &b.clips.clips,
             layers: &b.clips.layers,
             positions: &self.positions,

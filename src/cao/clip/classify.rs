@@ -1,13 +1,14 @@
 //! Clip classification (CAO §3.5 step 4): opacity after clipping, anti-aliased by eq. (5),
 //! `O_AA = C_visible / (N + 9) · O_voxel`, and the category of every voxel.
 //!
-//! In: `full_opacity`, the clips with layers and dilation maps, the words of `clip_bricks`. Out: `opacity` V_o (3D r32float), `mask` V_m (3D r8uint: a
+//! In: `full_opacity`, features, of which clips leave some voxels whole, the clips with layers and dilation maps, the words of `clip_bricks`. Out: `opacity` V_o (3D r32float), `mask` V_m (3D r8uint: a
 //! [`CLIPPED`], b [`AFFECTED`], c [`UNTOUCHED`]), `count` of each. Cost: one distance a voxel and clip
 //! where the brick's word leaves it open; 9 or 9 + N samples only for voxels that a clip's surface may pass.
 
 use crate::clip::clips::ClipSet;
 use crate::clip::positions;
 use crate::field::Field;
+use crate::field::features::FeatureSet;
 use cao_gpu::Result;
 use cao_gpu::{Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
 use cao_kernels::classify as kernel;
@@ -46,6 +47,7 @@ impl Classify {
         &self,
         rec: &mut Recorder,
         field: &Field,
+        features: &FeatureSet,
         clips: &ClipSet,
         samples: AntiAliasing,
         reach: f32,
@@ -73,6 +75,8 @@ impl Classify {
             mask,
             count: &self.count,
             clip_bricks,
+            features: &features.table,
+            feature_index: &features.index,
         };
         rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), field.dims)
     }

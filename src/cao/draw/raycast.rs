@@ -12,6 +12,7 @@ use crate::draw::eyes::FrameBuffer;
 use crate::draw::filter;
 use crate::draw::picture::{HALF_COLOUR, Picture};
 use crate::field::Field;
+use crate::field::features::FeatureSet;
 use crate::field::transfer::TransferBuffer;
 use crate::host::row_of_groups;
 use cao_gpu::{Buffer, Format, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
@@ -22,10 +23,14 @@ use std::sync::OnceLock;
 /// What the kernel reads.
 #[derive(Clone, Copy)]
 pub struct Bindings<'a> {
-    /// The volume.
+    /// The volume; with features that of opacities after them.
     pub field: &'a Field,
-    /// Transfer function.
+    /// Its transfer function.
     pub transfer: &'a TransferBuffer,
+    /// Values, for colours.
+    pub values: &'a Image,
+    /// Features.
+    pub features: &'a FeatureSet,
     /// V_AO.
     pub ambient: &'a Image,
     /// How far rays may leap.
@@ -38,36 +43,67 @@ pub struct Bindings<'a> {
     pub frame: &'a FrameBuffer,
 }
 
+/// The pipelines of one kind of pixels, built when such a picture first comes.
+#[derive(Default)]
+struct Pipelines {
+    floats: OnceLock<Pipeline>,
+    halves: OnceLock<Pipeline>,
+}
+
 /// The kernel `raycast`.
 pub struct Raycast {
     gpu: Gpu,
-    pipeline: Pipeline,
-    /// Into half floats; built when such a picture first comes.
-    half: OnceLock<Pipeline>,
-    by_hand: u32,
+    plain: Pipelines,
+    featured: Pipelines,
+    /// Of 8-bit texels.
+    coarse: bool,
     edge: Sampler,
 }
 
+/// The bindings of an entry point, which are the same but for the image of colours.
+macro_rules! bindings {
+    ($of:ident, $b:expr, $edge:expr, $picture:expr, $colours:ident) => {
+        kernel::$of {
+            volume: &$b.field.volume,
+            transfer: &$b.transfer.buffer,
+            ambient: $b.ambient,
+            edge: $edge,
+            frame: &$b.frame.buffer,
+            distances: $b.distances,
+            bounds: $b.bounds,
+            clips: &$b.clips.clips,
+            layers: &$b.clips.layers,
+            values: $b.values,
+            feature_index: &$b.features.index,
+            features: &$b.features.table,
+            $colours: &$picture.colour,
+            depths: &$picture.depth,
+        }
+    };
+}
+
 impl Raycast {
-    /// Builds the pipeline for a volume. Uses the device's queue and waits for it.
+    /// Builds the pipeline for a volume without features. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu, field: &Field) -> Result<Self> {
         let coarse = field.volume.desc().format == Format::R8Unorm && !filter::keeps_fractions(gpu)?;
-        Ok(Self {
+        let raycast = Self {
             gpu: gpu.clone(),
-            half: OnceLock::new(),
-            by_hand: u32::from(coarse),
-            pipeline: gpu.compute(&kernel::SHADER, "main")?,
+            plain: Pipelines::default(),
+            featured: Pipelines::default(),
+            coarse,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
-        })
+        };
+        raycast.built(&raycast.plain.floats, "main")?;
+        Ok(raycast)
     }
 
-    /// Builds what draws into half floats, when it is first asked for.
-    fn half(&self) -> Result<&Pipeline> {
-        if let Some(pipeline) = self.half.get() {
+    /// Builds what is not there yet.
+    fn built<'a>(&self, pipeline: &'a OnceLock<Pipeline>, entry: &str) -> Result<&'a Pipeline> {
+        if let Some(pipeline) = pipeline.get() {
             return Ok(pipeline);
         }
-        let pipeline = self.gpu.compute(&kernel::SHADER, "half_floats")?;
-        Ok(self.half.get_or_init(|| pipeline))
+        let built = self.gpu.compute(&kernel::SHADER, entry)?;
+        Ok(pipeline.get_or_init(|| built))
     }
 
     /// Writes the pixels of these tiles of a band, whose first row is the picture's; the frame has as many views. No bit of a pixel
@@ -83,49 +119,41 @@ impl Raycast {
         tiles: Range<u32>,
         ended: bool,
     ) -> Result<()> {
-        let b = bindings;
+        let (b, edge) = (bindings, &self.edge);
+        let featured = !b.features.features.is_empty();
         let params = kernel::RaycastParams {
             size: band.size,
-            by_hand: self.by_hand,
+            by_hand: u32::from(self.coarse && !featured),
             first_row: band.first,
             rows: band.rows,
             first_tile: tiles.start,
             tiles: tiles.len() as u32,
             ended: u32::from(ended),
+            channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm),
+            pad: Default::default(),
         };
         let [x, y, _] = row_of_groups(tiles.len() as u32);
         let groups = [x, y, picture.views() as u32];
-        let binds = kernel::MainBindings {
-            volume: &b.field.volume,
-            transfer: &b.transfer.buffer,
-            ambient: b.ambient,
-            edge: &self.edge,
-            frame: &b.frame.buffer,
-            distances: b.distances,
-            bounds: b.bounds,
-            clips: &b.clips.clips,
-            layers: &b.clips.layers,
-            colours: &picture.colour,
-            depths: &picture.depth,
-        };
         let push = bytemuck::bytes_of(&params);
-        if picture.colour.desc().format != HALF_COLOUR {
-            return Ok(rec.dispatch(&self.pipeline, &binds, push, groups)?);
+        let of = if featured { &self.featured } else { &self.plain };
+        match (featured, picture.colour.desc().format == HALF_COLOUR) {
+            (false, false) => {
+                let binds = bindings!(MainBindings, b, edge, picture, colours);
+                rec.dispatch(self.built(&of.floats, "main")?, &binds, push, groups)?;
+            }
+            (false, true) => {
+                let binds = bindings!(HalfFloatsBindings, b, edge, picture, half_colours);
+                rec.dispatch(self.built(&of.halves, "half_floats")?, &binds, push, groups)?;
+            }
+            (true, false) => {
+                let binds = bindings!(FeaturedBindings, b, edge, picture, colours);
+                rec.dispatch(self.built(&of.floats, "featured")?, &binds, push, groups)?;
+            }
+            (true, true) => {
+                let binds = bindings!(FeaturedHalfFloatsBindings, b, edge, picture, half_colours);
+                rec.dispatch(self.built(&of.halves, "featured_half_floats")?, &binds, push, groups)?;
+            }
         }
-        let kernel::MainBindings { colours: half_colours, .. } = binds;
-        let binds = kernel::HalfFloatsBindings {
-            volume: binds.volume,
-            transfer: binds.transfer,
-            bounds: binds.bounds,
-            ambient: binds.ambient,
-            edge: binds.edge,
-            frame: binds.frame,
-            distances: binds.distances,
-            clips: binds.clips,
-            layers: binds.layers,
-            depths: binds.depths,
-            half_colours,
-        };
-        Ok(rec.dispatch(self.half()?, &binds, push, groups)?)
+        Ok(())
     }
 }

@@ -30,6 +30,7 @@ pub struct Slice {
 pub struct Commit {
     choose: Pipeline,
     halves: Pipeline,
+    fours: Pipeline,
     floats: Pipeline,
     /// Indirect arguments: from byte 0 on those of the slice.
     pub turn: Buffer,
@@ -42,6 +43,7 @@ impl Commit {
         Ok(Self {
             choose: pipeline("choose")?,
             halves: pipeline("halves")?,
+            fours: pipeline("fours")?,
             floats: pipeline("floats")?,
             turn: gpu.buffer("turn", size_of::<kernel::Turn>() as u64, BufferUse::Device)?,
         })
@@ -80,6 +82,10 @@ impl Commit {
             Format::R16Unorm => {
                 let binds = kernel::HalvesBindings { list, made, half_shown: shown };
                 rec.dispatch_indirect(&self.halves, &binds, push, &self.turn, COMMIT_AT)
+            }
+            Format::Rgba16Unorm => {
+                let binds = kernel::FoursBindings { list, made, fours_shown: shown };
+                rec.dispatch_indirect(&self.fours, &binds, push, &self.turn, COMMIT_AT)
             }
             _ => {
                 let binds = kernel::FloatsBindings { list, made, shown };

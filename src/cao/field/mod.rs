@@ -6,6 +6,7 @@
 
 pub mod bricks;
 pub mod commit;
+pub mod features;
 pub mod near;
 pub mod occupancy;
 pub mod ones;

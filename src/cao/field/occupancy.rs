@@ -4,6 +4,7 @@
 //! In: `volume`, `transfer`. Out: `occupancy`, one u32 a brick, x fastest. Cost: 1.6 reads a voxel.
 
 use crate::field::Field;
+use crate::field::features::FeatureSet;
 use crate::field::transfer::TransferBuffer;
 use cao_gpu::Result;
 use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
@@ -26,6 +27,7 @@ impl Occupancy {
         rec: &mut Recorder,
         field: &Field,
         transfer: &TransferBuffer,
+        features: &FeatureSet,
         occupancy: &Buffer,
     ) -> Result<()> {
         let params = kernel::OccupancyParams {
@@ -34,7 +36,13 @@ impl Occupancy {
             bricks: field.bricks(),
             bias: field.bias,
         };
-        let binds = kernel::MainBindings { volume: &field.volume, transfer: &transfer.buffer, occupancy };
+        let binds = kernel::MainBindings {
+            volume: &field.volume,
+            transfer: &transfer.buffer,
+            occupancy,
+            features: &features.table,
+            feature_index: &features.index,
+        };
         let [x, y, z] = field.bricks();
         let groups = [x.div_ceil(kernel::TAKEN), y, z];
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)

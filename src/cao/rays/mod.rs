@@ -2,4 +2,5 @@
 
 #[expect(clippy::module_inception, reason = "named as its kernel")]
 pub mod rays;
+pub(crate) mod ruled;
 pub mod traced;

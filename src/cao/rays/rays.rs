@@ -5,14 +5,14 @@
 //! write a voxel. Cost: N·M reads of V_o a voxel at most; a ray ends when it is dark or leaves the volume. Forms that were timed on a
 //! GPU: `benches/runs/2026-11-26-h200-rays-prototype/`.
 
+use super::ruled::Ruled;
 use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
-use crate::host::device_buffer;
 use cao_gpu::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
+use cao_gpu::{Gpu, Image, Recorder};
 use cao_kernels::rays as kernel;
-use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::occlusion::{Occlusion, Quadrature};
 use cao_model::settings::Scope;
 
 /// Longest ray, offset included, in smallest spacings: what was tested.
@@ -26,13 +26,14 @@ pub struct RayPlan {
     pub directions: Vec<kernel::Direction>,
     /// How far in mm a change of opacity can change values: rays and what they interpolate.
     pub reach_mm: f32,
-    rule: Quadrature,
+    pub(crate) rule: Quadrature,
     /// M.
-    cells: u32,
-    step_mm: f32,
-    shift: f32,
+    pub(crate) cells: u32,
+    pub(crate) step_mm: f32,
+    /// How much farther out than half a step they begin, in steps.
+    pub(crate) shift: f32,
     /// Farthest cell from its voxel along each axis.
-    reach: [u32; 3],
+    pub(crate) reach: [u32; 3],
 }
 
 impl RayPlan {
@@ -95,26 +96,14 @@ impl RayPlan {
         })
     }
 
+    /// How many directions a kernel is to follow: none where rays have no cells.
+    pub(crate) fn followed(&self) -> u32 {
+        if self.cells == 0 { 0 } else { self.directions.len() as u32 }
+    }
+
     /// Reads of V_o for a brick, at most.
     pub fn brick_samples(&self) -> f64 {
         f64::from(kernel::VOXELS) * self.directions.len() as f64 * f64::from(self.cells.max(1))
-    }
-}
-
-/// `a / −ln(1 − a)` in 65536ths at a = 256 i / 65535, the mean transmittance of a cell of this opacity. The last is 0: nothing comes
-/// through.
-fn cell_means() -> kernel::Cells {
-    const LAST: usize = kernel::MEANS as usize - 1;
-    let whole = f64::from(kernel::WHOLE) + 1.0;
-    kernel::Cells {
-        mean: std::array::from_fn(|i| match i {
-            0 => whole as u32,
-            LAST => 0,
-            _ => {
-                let a = (256 * i) as f64 / f64::from(kernel::WHOLE);
-                (whole * a / -(1.0 - a).ln()).round() as u32
-            }
-        }),
     }
 }
 
@@ -131,35 +120,18 @@ pub struct Bindings<'a> {
 
 /// The kernel `rays`, one pipeline a rule.
 pub struct Rays {
-    nearest: Pipeline,
-    hybrid: Pipeline,
-    linear: Pipeline,
-    field: Sampler,
-    directions: Buffer,
-    cells: Buffer,
+    ruled: Ruled,
 }
 
 impl Rays {
     /// Builds the pipelines. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
-        let room = size_of::<kernel::Direction>() as u64 * u64::from(RaySet::MOST);
-        Ok(Self {
-            nearest: pipeline("nearest")?,
-            hybrid: pipeline("hybrid")?,
-            linear: pipeline("linear")?,
-            field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
-            directions: gpu.buffer("directions", room, BufferUse::Device)?,
-            cells: device_buffer(gpu, "cell means", bytemuck::bytes_of(&cell_means()))?,
-        })
+        Ok(Self { ruled: Ruled::new(gpu, &kernel::SHADER)? })
     }
 
     /// Writes the directions of a plan; once after each change of the settings.
     pub fn record_directions(&self, rec: &mut Recorder, plan: &RayPlan) -> Result<()> {
-        rec.barrier(&[Access::StorageRead], &[Access::TransferWrite]);
-        rec.update(&self.directions, 0, bytemuck::cast_slice(&plan.directions))?;
-        rec.barrier(&[Access::TransferWrite], &[Access::StorageRead]);
-        Ok(())
+        self.ruled.record_directions(rec, plan)
     }
 
     /// Works on the list, or some of its bricks, along the directions written last. `opacity` is per `reference_mm`.
@@ -176,23 +148,15 @@ impl Rays {
     ) -> Result<()> {
         let params = params(field, plan, reference_mm, scope, take.first());
         let (binds, push) = (self.binds(b), bytemuck::bytes_of(&params));
-        take.dispatch(rec, self.pipeline(plan), &binds, push, &b.list.buffer)
-    }
-
-    fn pipeline(&self, plan: &RayPlan) -> &Pipeline {
-        match plan.rule {
-            Quadrature::Nearest => &self.nearest,
-            Quadrature::Linear => &self.linear,
-            _ => &self.hybrid,
-        }
+        take.dispatch(rec, self.ruled.pipeline(plan), &binds, push, &b.list.buffer)
     }
 
     fn binds<'a>(&'a self, b: Bindings<'a>) -> kernel::HybridBindings<'a> {
         kernel::HybridBindings {
             opacity: b.opacity,
-            field: &self.field,
-            directions: &self.directions,
-            cells: &self.cells,
+            field: &self.ruled.field,
+            directions: &self.ruled.directions,
+            cells: &self.ruled.cells,
             list: &b.list.buffer,
             ambient: b.ambient,
         }
@@ -202,7 +166,7 @@ impl Rays {
 fn params(field: &Field, plan: &RayPlan, reference_mm: f32, scope: Scope, base: u32) -> kernel::RaysParams {
     kernel::RaysParams {
         dims: field.dims,
-        directions: if plan.cells == 0 { 0 } else { plan.directions.len() as u32 },
+        directions: plan.followed(),
         bricks: field.bricks(),
         cells: plan.cells,
         reach: plan.reach,
@@ -217,15 +181,7 @@ fn params(field: &Field, plan: &RayPlan, reference_mm: f32, scope: Scope, base: 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn cell_means_fall_from_all_to_nothing() {
-        let means = cell_means().mean;
-        assert_eq!((means[0], means[256]), (65536, 0));
-        assert!(means.windows(2).all(|w| w[0] > w[1]));
-        // a = 0.5: 0.5 / ln 2.
-        assert!((f64::from(means[128]) / 65536.0 - 0.7213).abs() < 1e-3);
-    }
+    use cao_model::occlusion::RaySet;
 
     #[test]
     fn rays_are_as_long_as_they_are_asked_for_and_no_longer_than_256_voxels() {

@@ -283,7 +283,7 @@ impl Renderer {
         }
         let mut parts = Vec::new();
         if changed.opacities {
-            parts.push(self.subject.occupancy());
+            parts.extend(self.subject.classified());
         }
         parts.extend(self.ambient.update(&self.subject, changed, into));
         // Of a build they come with what opens it.
@@ -307,7 +307,7 @@ impl Renderer {
     fn record_shown(&self, rec: &mut Recorder, unshown: Changed) -> Result<()> {
         let mut parts = Vec::new();
         if unshown.opacities {
-            parts.push(self.subject.occupancy());
+            parts.extend(self.subject.classified());
         }
         if unshown.clips {
             parts.push(self.ambient.clips(&self.subject));

@@ -88,8 +88,9 @@ impl Renderer {
             return Err(Error::refused("picture", problem));
         }
         let (subject, fields) = (&self.subject, self.ambient.fields());
+        let (field, transfer) = subject.opacities();
         if tiles.start == 0 {
-            self.frame.record(rec, &subject.field, views, look, subject.reference_mm())?;
+            self.frame.record(rec, field, views, look, subject.reference_mm())?;
         }
         rec.barrier(
             &[Access::TransferRead, Access::SampledRead, Access::GraphicsRead, Access::StorageWrite],
@@ -102,8 +103,10 @@ impl Renderer {
         let ended = self.record_scenes(rec, shot, band.size)?;
         rec.stage(stages::RAYCAST)?;
         let bindings = Bindings {
-            field: &subject.field,
-            transfer: &subject.transfer_buffer,
+            field,
+            transfer,
+            values: &subject.field.volume,
+            features: &subject.features,
             ambient: fields.ambient,
             distances: &self.distances,
             bounds: &self.bounds,

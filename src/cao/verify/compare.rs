@@ -1,6 +1,6 @@
 //! Bitwise comparison of two ambient volumes on every voxel that has a value (CAO §4: "exactly the same").
 //!
-//! In: `expected`, `actual` (3D r32float or r16unorm), `mask` or `todo`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
+//! In: `expected`, `actual` (3D r32float, r16unorm or rgba16unorm), `mask` or `todo`, `opacity`. Out: [`Difference`]. Cost: up to 56 reads for each voxel of the list.
 
 use crate::ambient::Recomputed;
 use crate::field::Field;

@@ -8,7 +8,7 @@ use crate::draw::eyes::Views;
 use crate::host::device_buffer;
 use crate::renderer::Renderer;
 use cao_gpu::Result;
-use cao_gpu::{Access, BufferUse, Gpu, Image, Pipeline, Sampler, SamplerDesc};
+use cao_gpu::{Access, BufferUse, Format, Gpu, Image, Pipeline, Sampler, SamplerDesc};
 use cao_kernels::consistency as kernel;
 use cao_model::look::Look;
 use cao_model::view::View;
@@ -51,7 +51,10 @@ impl Consistency {
         let seen = gpu.buffer("seen", bytes, BufferUse::Device)?;
         let read_back = gpu.buffer("seen read-back", bytes, BufferUse::Readback)?;
         let mut rec = gpu.recorder("consistency")?;
-        let params = kernel::ConsistencyParams { count: points.len() as u32 };
+        let params = kernel::ConsistencyParams {
+            count: points.len() as u32,
+            channels: u32::from(ambient.desc().format == Format::Rgba16Unorm),
+        };
         let binds = kernel::MainBindings {
             opacity,
             ambient,

@@ -1,7 +1,7 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in [`cao_cli::args`].
 
 use anyhow::{Context, Result};
-pub use cao_cli::args::{Global, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
+pub use cao_cli::args::{Global, Parts, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
 use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
 use cao_measure::stability::Trial;
 use cao_model::METHODS;
@@ -224,6 +224,8 @@ pub struct Render {
     #[command(flatten)]
     pub clips: Clips,
     #[command(flatten)]
+    pub parts: Parts,
+    #[command(flatten)]
     pub raw: Raw,
 }
 
@@ -257,6 +259,8 @@ pub struct Occlusion {
     #[command(flatten)]
     pub clips: Clips,
     #[command(flatten)]
+    pub parts: Parts,
+    #[command(flatten)]
     pub raw: Raw,
 }
 
@@ -286,6 +290,8 @@ pub struct Verify {
     pub method: Option<Verified>,
     #[command(flatten)]
     pub settings: Settings,
+    #[command(flatten)]
+    pub parts: Parts,
     #[command(flatten)]
     pub raw: Raw,
 }

@@ -3,6 +3,8 @@
 use crate::args::{Global, Info};
 use anyhow::Result;
 use cao_cli::output::Out;
+use cao_formats::feature::segments;
+use cao_formats::scene::VolumeSource;
 use cao_model::frame::Turn;
 use cao_model::order::Layout;
 use cao_model::volume::{Space, Volume};
@@ -40,6 +42,13 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
     }
     out.line(format!("rescale   stored * {} + {}", volume.slope, volume.intercept));
     out.line(format!("values    {low} ... {high}"));
+    let segments = match args.raw.source(&args.input)? {
+        VolumeSource::File(path) => segments(&path)?,
+        _ => Default::default(),
+    };
+    for (label, segment) in &segments {
+        out.line(format!("segment   {label} {}", segment.name));
+    }
     let bins = histogram(&volume, low, high);
     let none = volume.len() as u64 - bins.iter().sum::<u64>();
     if none > 0 {
@@ -68,6 +77,7 @@ pub fn run(global: &Global, args: &Info) -> Result<ExitCode> {
         "largest": high,
         "no_number": none,
         "histogram": bins,
+        "segments": segments.iter().map(|(label, s)| json!({ "label": label, "name": s.name })).collect::<Vec<_>>(),
     }));
     out.finish()?;
     Ok(ExitCode::SUCCESS)

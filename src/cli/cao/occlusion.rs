@@ -6,6 +6,7 @@ use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
+use cao_formats::feature::FeatureSettings;
 use clap::ArgMatches;
 use std::ffi::OsStr;
 use std::process::ExitCode;
@@ -17,16 +18,19 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut progress = Progress::default();
     let clips = args::clips(matches)?;
     progress.stage("reading");
-    let (mut volume, turn) = args.frame.unwrap_or_default().arrange(args.raw.open(&args.input)?)?;
+    let frame = args.frame.unwrap_or_default();
+    let (mut volume, turn) = frame.arrange(args.raw.open(&args.input)?)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
     let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range());
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
+    let features = args.parts.of(FeatureSettings::default(), &volume, frame)?;
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&turn.clips(&clips))?;
+    renderer.set_features(features.clone())?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let timings = renderer.update(&mut |done| progress.set(done))?;
@@ -50,6 +54,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
+    out.features(&features);
     out.setup(renderer.setup(), &volume);
     if let Some(planned) = &planned {
         planned.print(&mut out);

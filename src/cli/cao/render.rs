@@ -43,6 +43,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         None => scene.transfer(volume.range()),
     };
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
+    let features = args.parts.of(std::mem::take(&mut scene.features), &volume, scene.frame)?;
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
     let look = turn.look(&scene.look);
     if !look.shading.occluded() {
@@ -69,6 +70,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let bands = Bands::new(&gpu, size, 2)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     renderer.set_clips(&turn.clips(&scene.clips))?;
+    renderer.set_features(features.clone())?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;
     progress.stage("occlusion");
     let mut timings = renderer.update(&mut |done| progress.set(done))?;
@@ -91,6 +93,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let mut out = Out::new(global);
     out.device(&gpu);
     out.volume(&args.input, &volume);
+    out.features(&features);
     out.setup(renderer.setup(), &volume);
     if let Some(planned) = &planned {
         planned.print(&mut out);

@@ -4,11 +4,13 @@ use crate::args::{self, Global, PROOF, Verified, Verify, setup};
 use anyhow::Result;
 use cao::renderer::{COLOUR, Renderer};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_formats::feature::FeatureSettings;
 use cao_gpu::Timings;
 use cao_measure::exactness::{Plan, Report, verify};
 use cao_model::METHODS;
 use cao_model::clip::Shape;
 use cao_model::error::shown_path;
+use cao_model::frame::Frame;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
 use serde_json::json;
@@ -40,7 +42,8 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
         let transfer = args::transfer(transfer, &mut volume, name)?;
         let setup = |method: &Method| setup(&args.settings, &volume, *method, args.all_voxels);
         let setups = methods.iter().map(setup).collect::<Result<Vec<_>>>()?;
-        inputs.push((shown_path(name), volume, setups, transfer));
+        let features = args.parts.of(FeatureSettings::default(), &volume, Frame::default())?;
+        inputs.push((shown_path(name), volume, setups, transfer, features));
     }
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
@@ -49,10 +52,11 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
     let mut exact = true;
     let mut vacuous = false;
     let mut reports = Vec::new();
-    for (input, volume, setups, transfer) in inputs {
+    for (input, volume, setups, transfer, features) in inputs {
         for setup in setups {
             progress.stage("preparing");
             let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR)?;
+            renderer.set_features(features.clone())?;
             let plan = Plan { shapes: shapes.clone(), poses: args.poses, seed: args.seed };
             progress.stage("verifying");
             progress.say(&format!("verifying {}", setup.method.name()));
@@ -191,7 +195,7 @@ mod tests {
         let rule = Some(Quadrature::Left);
         let (found, left_out) = methods(Some(Verified::All), rule);
         assert!(found.iter().all(|method| method.has(Quadrature::Left)));
-        assert_eq!((left_out, found.len()), (vec!["rays"], METHODS.len() - 1));
+        assert_eq!((left_out, found.len()), (vec!["fdao", "rays"], METHODS.len() - 2));
         // By the renderer.
         assert_eq!(methods(Some(Verified::One(Method::Rays)), rule), (vec![Method::Rays], vec![]));
     }

@@ -25,10 +25,19 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 7] = [
+static CONTENDERS: [Kind; 8] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
+    Kind {
+        name: "fdAO",
+        enters: Enters::As(Listed {
+            method: Method::FeatureDriven,
+            computes: "bricks that show and changed, of each feature",
+            ray: 0.08,
+            few: &[RaySet::Spiral(50)],
+        }),
+    },
     Kind {
         name: "LAO",
         enters: Enters::As(Listed {
@@ -266,14 +275,20 @@ mod tests {
     #[test]
     fn names_stay() {
         let names = CONTENDERS.each_ref().map(|kind| kind.name);
-        assert_eq!(names, ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"]);
-        assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "rays"]);
-        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(
+            names,
+            ["solid colour", "image space", "LAO (unit)", "fdAO", "LAO", "CAO literal", "CAO", "rays"]
+        );
+        assert_eq!(
+            METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(),
+            ["fdAO", "LAO", "CAO", "rays"]
+        );
+        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6, 7]);
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 6]), (false, [1, 3, 4, 21, 4, 21, 15])] {
+        for (quick, counts) in [(true, [1, 1, 4, 2, 8, 2, 8, 6]), (false, [1, 3, 4, 3, 21, 4, 21, 15])] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

@@ -174,6 +174,7 @@ fn pictures(
     let frame = |ambient| Frame {
         grid: cut.grid,
         values: &values,
+        parts: None,
         transfer: &cut.transfer,
         reference_mm: 1.0,
         ambient,

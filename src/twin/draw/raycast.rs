@@ -14,7 +14,8 @@
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::air::{air_of, ambient_at};
-use crate::draw::segment::{segment, varies};
+use crate::draw::feature_colour::{Parts, colour_at};
+use crate::draw::segment::{Segment, segment, varies};
 use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
 use cao_kernels::raycast as kernel;
@@ -37,9 +38,11 @@ const PARTS: u64 = kernel::PARTS as u64;
 pub struct Frame<'a> {
     /// Shape of the fields.
     pub grid: Grid,
-    /// Data values V.
+    /// Data values V; with features opacities after them.
     pub values: &'a [f32],
-    /// Opacity and colour of data values.
+    /// The features, if there are any.
+    pub parts: Option<Parts<'a>>,
+    /// Opacity and colour of data values; with features its opacities are its values.
     pub transfer: &'a TransferFunction,
     /// Length ℓ in mm that opacities are for.
     pub reference_mm: f64,
@@ -177,7 +180,10 @@ fn pixel(
                     cut: clip,
                     beside: t - cut_at,
                 };
-                colour += covered * shaded(frame, &shown, direction, light, ambient);
+                let hidden = frame.parts.filter(|_| !shown_at(t));
+                let shown = Shown { cut: shown.cut.filter(|_| hidden.is_none()), ..shown };
+                let left = Frame { values: hidden.map_or(frame.values, |parts| parts.spared), ..*frame };
+                colour += covered * shaded(&left, &shown, direction, light, ambient);
                 alpha += covered;
                 if depth == 1.0 && alpha >= 0.5 {
                     depth = vulkan_depth(view, t / slant);
@@ -193,9 +199,11 @@ fn pixel(
         }
         let next = place(n + size).min(end);
         let [mut from, mut to] = [t, next];
+        let mut hidden_at = None;
         let [shown, stays] = [t, next].map(shown_at);
         if shown != stays {
             let (hidden, cut) = if stays { cut(t, next, shown_at) } else { cut(next, t, shown_at) };
+            hidden_at = Some(hidden);
             if stays {
                 clip =
                     frame.clips.iter().position(|clip| clip.hides((origin + hidden * direction).as_vec3()));
@@ -204,10 +212,30 @@ fn pixel(
                 to = cut;
             }
         }
-        if shown || stays {
-            let values = [from, to].map(value_at);
+        let mut ends = [from, to];
+        let mut values = ends.map(value_at);
+        let mut found = piece(frame, frame.values, at, ends, values);
+        if let Some(parts) = frame.parts.filter(|_| !(shown && stays)) {
+            // What clips leave whole of what they hide.
+            let [mut first, mut last] = [t, next];
+            if let Some(hidden) = hidden_at {
+                if stays { last = hidden } else { first = hidden }
+            }
+            let kept_at = |t: f64| trilinear_clamped(&frame.grid, parts.spared, at(t)) as f32;
+            let kept_values = [first, last].map(kept_at);
+            let kept = piece(frame, parts.spared, at, [first, last], kept_values);
+            ends = [t, next];
+            (found, values) = match hidden_at {
+                None => (kept, kept_values),
+                Some(hidden) if stays => {
+                    (joined(kept, found, (hidden - t) / (next - t)), [kept_values[0], values[1]])
+                }
+                Some(hidden) => (joined(found, kept, (hidden - t) / (next - t)), [values[0], kept_values[1]]),
+            };
+        }
+        if shown || stays || frame.parts.is_some_and(|_| found.alpha > 0.0) {
+            [from, to] = ends;
             let length = (to - from) / frame.reference_mm;
-            let found = segment(frame.transfer, values[0], values[1], length);
             if size > 1 && varies(frame.transfer, &found, values, length, open * (1.0 - alpha)) {
                 size /= 2;
                 continue;
@@ -225,6 +253,32 @@ fn pixel(
         size = (2 * size).min(PARTS).min(1 << n.trailing_zeros());
     }
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
+}
+
+/// A segment between two depths, at which voxels of these values or opacities have `values`.
+fn piece(
+    frame: &Frame,
+    voxels: &[f32],
+    at: impl Fn(f64) -> [f64; 3],
+    [from, to]: [f64; 2],
+    values: [f32; 2],
+) -> Segment {
+    let found = segment(frame.transfer, values[0], values[1], (to - from) / frame.reference_mm);
+    let Some(parts) = &frame.parts else { return found };
+    let place = at(from + found.centre * (to - from));
+    Segment { colour: found.alpha * colour_at(&frame.grid, parts, voxels, frame.transfer, place), ..found }
+}
+
+/// Two segments one behind the other as one, the first of which has a share of the length.
+fn joined(a: Segment, b: Segment, share: f64) -> Segment {
+    let behind = (1.0 - a.alpha) * b.alpha;
+    let alpha = a.alpha + behind;
+    let centre = a.alpha * a.centre * share + behind * (share + b.centre * (1.0 - share));
+    Segment {
+        alpha,
+        colour: a.colour + (1.0 - a.alpha) * b.colour,
+        centre: if alpha > 0.0 { centre / alpha } else { 0.5 },
+    }
 }
 
 /// Slope of sRGB coding (IEC 61966-2-1) at a linear component; beyond 1, where a screen shows no more, that at 1.
@@ -322,6 +376,7 @@ mod tests {
             let frame = Frame {
                 grid: self.grid,
                 values: &self.values,
+                parts: None,
                 transfer: &self.transfer,
                 reference_mm: 1.0,
                 ambient: &self.ambient,

@@ -57,7 +57,7 @@ fn clear(a: f64) -> f64 {
     if 1.0 - a < 1e-6 { 0.0 } else { 1.0 - a }
 }
 
-struct Rays<'a> {
+pub(crate) struct Rays<'a> {
     grid: &'a Grid,
     floats: &'a [f32],
     /// f in 65536ths.
@@ -75,7 +75,8 @@ struct Rays<'a> {
 }
 
 impl<'a> Rays<'a> {
-    fn new(grid: &'a Grid, floats: &'a [f32], occlusion: &Occlusion, reference_mm: f32) -> Self {
+    /// Of opacities in 0 … 1, of `reference_mm`.
+    pub(crate) fn new(grid: &'a Grid, floats: &'a [f32], occlusion: &Occlusion, reference_mm: f32) -> Self {
         let spacing = grid.spacing.map(|s| f64::from(s as f32));
         let smallest = spacing.into_iter().fold(f64::INFINITY, f64::min);
         let (cells, step_mm) = (occlusion.samples(smallest), occlusion.step(smallest));
@@ -107,7 +108,8 @@ impl<'a> Rays<'a> {
         }
     }
 
-    fn value(&self, voxel: [usize; 3]) -> u16 {
+    /// Of one voxel in 65535ths, whether it needs one or not.
+    pub(crate) fn value(&self, voxel: [usize; 3]) -> u16 {
         if self.cells == 0 {
             return 65535;
         }

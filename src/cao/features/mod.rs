@@ -1,0 +1,5 @@
+//! Feature-driven ambient occlusion with contextual updates from change.
+
+pub mod driven;
+pub mod fdao;
+pub mod labels;

@@ -1,0 +1,94 @@
+//! The colour of a place of a volume with features.
+//!
+//! ```text
+//! k(p) = argmax_k Σ w V_f [f = k] over the eight voxels round p, the lowest where two have as much
+//! c(p) = c_k, or where the feature has none TF_c(Σ w V [f = k] / Σ w [f = k])
+//! ```
+//!
+//! Where a clip hides p only voxels that it leaves whole count.
+
+use crate::Grid;
+use cao_model::feature::Features;
+use cao_model::transfer::TransferFunction;
+use glam::{DVec3, Vec3};
+
+/// What of a volume belongs to which feature, x fastest.
+#[derive(Clone, Copy)]
+pub struct Parts<'a> {
+    /// How they are shown.
+    pub features: &'a Features,
+    /// The number of each voxel's.
+    pub index: &'a [u8],
+    /// Data values V.
+    pub values: &'a [f32],
+    /// Opacities that clips leave, 0 in all other voxels.
+    pub spared: &'a [f32],
+}
+
+/// Linear red, green and blue at index coordinates, of voxels with these opacities.
+pub fn colour_at(
+    grid: &Grid,
+    parts: &Parts,
+    opacity: &[f32],
+    transfer: &TransferFunction,
+    position: [f64; 3],
+) -> DVec3 {
+    let voxels = around(grid, position);
+    let share = |k: usize| -> f64 {
+        let own = voxels.iter().filter(|(i, _)| usize::from(parts.index[*i]) == k);
+        own.map(|(i, w)| w * f64::from(opacity[*i])).sum()
+    };
+    let (mut own, mut most) = (usize::from(parts.index[voxels[0].0]), 0.0);
+    for k in 0..=parts.features.list.len() {
+        if share(k) > most {
+            (own, most) = (k, share(k));
+        }
+    }
+    let colour = own.checked_sub(1).and_then(|k| parts.features.list[k].colour);
+    let colour = colour.unwrap_or_else(|| {
+        let of = |what: &dyn Fn(usize) -> f64| -> f64 {
+            let own = voxels.iter().filter(|(i, _)| usize::from(parts.index[*i]) == own);
+            own.map(|(i, w)| w * what(*i)).sum()
+        };
+        transfer.colour_at((of(&|i| f64::from(parts.values[i])) / of(&|_| 1.0)) as f32)
+    });
+    Vec3::from_array(colour).as_dvec3()
+}
+
+/// The eight voxels round a place, continued outside by the edge, and their linear weights.
+fn around(grid: &Grid, position: [f64; 3]) -> [(usize, f64); 8] {
+    let at: [f64; 3] = std::array::from_fn(|a| position[a].clamp(0.0, grid.dims[a] as f64 - 1.0));
+    std::array::from_fn(|corner| {
+        let up: [usize; 3] = std::array::from_fn(|a| corner >> a & 1);
+        let voxel = std::array::from_fn(|a| (at[a].floor() as usize + up[a]).min(grid.dims[a] - 1));
+        let weight = |a: usize| {
+            let t = at[a] - at[a].floor();
+            if up[a] == 1 { t } else { 1.0 - t }
+        };
+        (grid.index(voxel), (0..3).map(weight).product())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cao_model::feature::Feature;
+
+    /// Two voxels, a feature without a colour and a blue one.
+    #[test]
+    fn the_feature_with_more_of_the_opacity_has_the_place() {
+        let grid = Grid { dims: [2, 1, 1], spacing: [1.0; 3] };
+        let transfer =
+            TransferFunction::new(vec![[0.0, 1.0]], vec![[0.0, 0.0, 0.0, 0.0], [10.0, 1.0, 1.0, 0.0]], None)
+                .unwrap();
+        let list = vec![Feature::new("a"), Feature { colour: Some([0.0, 0.0, 1.0]), ..Feature::new("b") }];
+        let features = Features::by_labels(list, grid.dims, vec![1, 2]).unwrap();
+        let parts = Parts { features: &features, index: &[1, 2], values: &[10.0, 0.0], spared: &[0.0, 0.0] };
+        let at = |opacity: [f32; 2], x| colour_at(&grid, &parts, &opacity, &transfer, [x, 0.0, 0.0]);
+        // Not the colour of the value between, 6, which is half as bright.
+        assert_eq!(at([0.5, 0.5], 0.4), DVec3::new(1.0, 1.0, 0.0));
+        assert_eq!(at([0.5, 0.5], 0.6), DVec3::Z);
+        assert_eq!(at([0.2, 0.8], 0.4), DVec3::Z);
+        assert_eq!(at([0.5, 0.0], 0.9), DVec3::new(1.0, 1.0, 0.0));
+    }
+}

@@ -1,0 +1,3 @@
+//! Occlusion of features, each by itself.
+
+pub mod fdao;
