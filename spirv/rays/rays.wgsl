@@ -43,30 +43,10 @@ var<immediate> params: RaysParams;
 @group(0) @binding(4) var<storage, read> list: BrickList;
 @group(0) @binding(5) var ambient: texture_storage_3d<r16unorm, write>;
 
-// Invocations of a workgroup.
-const TEAM = 256u;
-// Voxels of a brick.
-const VOXELS = BRICK * BRICK * BRICK;
-// Edge of a brick with the voxels around it.
-const AROUND = BRICK + 2u;
+#include "shared/needed.wgsl"
 
-// Bits x + 1 of the rows of voxels -1 ... BRICK that have opacity, y + 1 + AROUND (z + 1).
-var<workgroup> rows: array<atomic<u32>, AROUND * AROUND>;
-var<workgroup> found: atomic<u32>;
-// Voxels that need a value, two a word.
-var<workgroup> members: array<atomic<u32>, VOXELS / 2u>;
-// What occlusion takes from them, in FINEths of a WHOLEth.
+// What occlusion takes from the voxels that need a value, in FINEths of a WHOLEth.
 var<workgroup> sums: array<atomic<u32>, VOXELS>;
-
-fn needed(local: vec3<u32>) -> bool {
-    var bits = 0u;
-    for (var z = 0u; z < 3u; z++) {
-        for (var y = 0u; y < 3u; y++) {
-            bits |= atomicLoad(&rows[local.y + y + AROUND * (local.z + z)]);
-        }
-    }
-    return (bits >> local.x & 7u) != 0u;
-}
 
 // One cell of opacity `a`; `halves` is what it counts.
 fn pass_cell(ray: Ray, a: u32, halves: u32) -> Ray {
@@ -165,55 +145,22 @@ fn traced(voxel: vec3<u32>, interior: bool, k: u32, rule: u32) -> Ray {
     return ray;
 }
 
-// A voxel of a brick, x fastest.
-fn inside(i: u32) -> vec3<u32> {
-    return vec3(i, i / BRICK, i / (BRICK * BRICK)) % BRICK;
-}
-
-// Of a voxel that needs a value, in its brick.
-fn place_of(slot: u32) -> vec3<u32> {
-    return inside(atomicLoad(&members[slot >> 1u]) >> ((slot & 1u) * 16u) & 0xffffu);
-}
-
 // One brick.
 fn work(group: vec3<u32>, lane: u32, rule: u32) {
     let entry = params.base + item_of_group(group);
     let listed = entry < list.count;
     let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    for (var i = lane; i < AROUND * AROUND; i += TEAM) {
-        atomicStore(&rows[i], 0u);
-    }
+    clear_needed(lane);
     for (var i = lane; i < MEANS; i += TEAM) {
         cell_means[i] = cells.mean[i];
     }
-    for (var i = lane; i < VOXELS / 2u; i += TEAM) {
-        atomicStore(&members[i], 0u);
-    }
-    if lane == 0u {
-        atomicStore(&found, 0u);
-    }
-    workgroupBarrier();
-    for (var i = lane; i < AROUND * AROUND * AROUND; i += TEAM) {
-        let place = vec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
-        // Beyond the low border it is a large number.
-        let voxel = corner + place - 1u;
-        if all(voxel < params.dims) && textureLoad(opacity, voxel, 0).r > 0.0 {
-            atomicOr(&rows[i / AROUND], 1u << place.x);
-        }
-    }
-    workgroupBarrier();
     for (var i = lane; i < VOXELS; i += TEAM) {
-        let local = inside(i);
-        if listed && all(corner + local < params.dims) {
-            if params.unneeded == 1u || needed(local) {
-                let slot = atomicAdd(&found, 1u);
-                atomicOr(&members[slot >> 1u], i << ((slot & 1u) * 16u));
-                atomicStore(&sums[slot], 0u);
-            } else {
-                textureStore(ambient, corner + local, vec4(1.0, 0.0, 0.0, 0.0));
-            }
-        }
+        atomicStore(&sums[i], 0u);
     }
+    workgroupBarrier();
+    mark_rows(corner, lane);
+    workgroupBarrier();
+    gather(corner, listed, lane);
     workgroupBarrier();
     let count = atomicLoad(&found);
     let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);

@@ -5,8 +5,10 @@ use crate::ambient::Ambient;
 use crate::by_brick::ByBrick;
 use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
+use crate::cones::traced::Cones;
 use crate::features::driven::Driven;
 use crate::rays::traced::Traced;
+use crate::spao::shells::Shells;
 use crate::subject::Subject;
 use cao_model::methods::Method;
 
@@ -35,6 +37,8 @@ const MAKERS: &[Maker] = &[
         new: |on| Ok(Box::new(Contextual::new(on)?)),
         map_radius: |on| Some(crate::cast::map_radius(on)),
     },
+    Maker { method: Method::Cones, new: |on| Ok(Box::new(ByBrick::<Cones>::new(on)?)), map_radius: |_| None },
+    Maker { method: Method::Spao, new: |on| Ok(Box::new(ByBrick::<Shells>::new(on)?)), map_radius: |_| None },
     // Changes are found in the opacities; nothing is dilated.
     Maker { method: Method::Rays, new: |on| Ok(Box::new(ByBrick::<Traced>::new(on)?)), map_radius: |_| None },
 ];

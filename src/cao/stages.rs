@@ -32,6 +32,24 @@ pub const LAO: Stage = Stage::new("lao", Phase::Ambient);
 pub const CONTEXTUAL: Stage = Stage::new("contextual", Phase::Ambient);
 /// The bricks within reach of a change.
 pub const CHOOSE: Stage = Stage::new("choose", Phase::Ambient);
+/// How volumes of means are looked up.
+pub const TABLE: Stage = Stage::new("table", Phase::Prepare);
+/// Volumes of means, level by level.
+pub const LEVELS: [Stage; 9] = [
+    Stage::new("level 1", Phase::Ambient),
+    Stage::new("level 2", Phase::Ambient),
+    Stage::new("level 3", Phase::Ambient),
+    Stage::new("level 4", Phase::Ambient),
+    Stage::new("level 5", Phase::Ambient),
+    Stage::new("level 6", Phase::Ambient),
+    Stage::new("level 7", Phase::Ambient),
+    Stage::new("level 8", Phase::Ambient),
+    Stage::new("level 9", Phase::Ambient),
+];
+/// Shells of cubes.
+pub const PRODUCT: Stage = Stage::new("product", Phase::Ambient);
+/// Cones of these bricks.
+pub const CONES: Stage = Stage::new("cones", Phase::Ambient);
 /// Rays of these bricks.
 pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 /// Which bricks have other features.

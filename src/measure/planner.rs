@@ -112,9 +112,11 @@ pub fn candidates(
     };
     let mut list = Vec::new();
     for entry in METHODS.iter().filter(chosen) {
-        // Sets that a method does not list are for who asks for them.
-        let asked = rays.as_ref().filter(|rays| entry.method.follows(**rays));
-        let sets = asked.map_or(entry.sets, std::slice::from_ref);
+        // Who asks for rays does not ask for a method without any; sets that a method does not list are for who asks for them.
+        if rays.is_some_and(|rays| !entry.method.follows(rays)) {
+            continue;
+        }
+        let sets = rays.as_ref().map_or(entry.sets, std::slice::from_ref);
         for &rays in sets {
             for &rule in entry.quadratures.iter().filter(|rule| quadrature.is_none_or(|only| **rule == only))
             {

@@ -37,6 +37,8 @@ pub enum Marker {
     Left,
     /// ◆
     Diamond,
+    /// ⬢
+    Hexagon,
 }
 
 /// Colour of axes and of text that is not about one series.
@@ -122,6 +124,9 @@ impl Drawing {
             Marker::Down => &[[0.0, 1.2], [1.1, -0.8], [-1.1, -0.8]],
             Marker::Right => &[[1.2, 0.0], [-0.8, 1.1], [-0.8, -1.1]],
             Marker::Left => &[[-1.2, 0.0], [0.8, 1.1], [0.8, -1.1]],
+            Marker::Hexagon => {
+                &[[0.0, -1.2], [1.05, -0.6], [1.05, 0.6], [0.0, 1.2], [-1.05, 0.6], [-1.05, -0.6]]
+            }
             Marker::Circle | Marker::Diamond => &[[0.0, -1.25], [1.25, 0.0], [0.0, 1.25], [-1.25, 0.0]],
         };
         let mut d = String::new();

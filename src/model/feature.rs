@@ -184,7 +184,9 @@ impl Features {
             return Err(Error::refused("intervals", problem));
         }
         for (place, &[low, high]) in all.iter().enumerate() {
-            if !(low < high) {
+            // No number is in none, so that NaN is refused, too.
+            let holds_some = low < high;
+            if !holds_some {
                 let problem = format!(
                     "its interval from {low} to {high} is empty; expected a first value that belongs to it and a larger one that ends it"
                 );

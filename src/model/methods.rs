@@ -17,6 +17,10 @@ pub enum Method {
     Cao,
     /// Rays by brick in whole numbers, only where opacities changed; equal to computing everything bit for bit.
     Rays,
+    /// Shells of cubes around each voxel, from volumes of means.
+    Spao,
+    /// Cones through volumes of means.
+    Cones,
 }
 
 /// What is known of a method, and how it is used unless one says otherwise.
@@ -64,6 +68,41 @@ pub static METHODS: &[Entry] = &[
         variants: &[&[]],
         contextual: true,
         same_values_as: Method::FeatureDriven,
+    },
+    Entry {
+        method: Method::Spao,
+        name: "spao",
+        title: "Smooth probabilistic ambient occlusion",
+        what: "shells of cubes around each voxel, from volumes of means that are made at every change",
+        source: "SPAO §1.2, §1.3",
+        rays: RaySet::None,
+        quadratures: &[Quadrature::Product],
+        sets: &[RaySet::None],
+        options: &["levels", "normal"],
+        variants: &[
+            &[],
+            &[("levels", "mixed:1")],
+            &[("levels", "mip")],
+            &[("levels", "reversed:3")],
+            &[("normal", "1")],
+            &[("levels", "mip"), ("normal", "1")],
+        ],
+        contextual: true,
+        same_values_as: Method::Spao,
+    },
+    Entry {
+        method: Method::Cones,
+        name: "cones",
+        title: "Cone tracing",
+        what: "cones through volumes of means that are made at every change",
+        source: "ours, after voxel cone tracing (docs/cones.md)",
+        rays: RaySet::W26,
+        quadratures: &[Quadrature::Cone],
+        sets: &[RaySet::W14, RaySet::W26],
+        options: &[],
+        variants: &[&[]],
+        contextual: true,
+        same_values_as: Method::Cones,
     },
     Entry {
         method: Method::Lao,
@@ -191,7 +230,9 @@ mod tests {
 
     #[test]
     fn every_method_has_one_entry_and_is_found_by_its_name() {
-        for method in [Method::FeatureDriven, Method::Lao, Method::Cao, Method::Rays] {
+        let all =
+            [Method::FeatureDriven, Method::Spao, Method::Cones, Method::Lao, Method::Cao, Method::Rays];
+        for method in all {
             assert_eq!(METHODS.iter().filter(|entry| entry.method == method).count(), 1);
             assert_eq!(Method::parse(method.name()), Ok(method));
         }
@@ -218,7 +259,12 @@ mod tests {
     fn who_names_no_method_gets_the_one_that_has_his_rule() {
         assert_eq!(Method::default(), Method::Rays);
         for rule in Quadrature::ALL {
-            let method = if Quadrature::CAST.contains(&rule) { Method::Cao } else { Method::Rays };
+            let method = match rule {
+                Quadrature::Product => Method::Spao,
+                Quadrature::Cone => Method::Cones,
+                rule if Quadrature::CAST.contains(&rule) => Method::Cao,
+                _ => Method::Rays,
+            };
             assert_eq!(Method::for_rule(Some(rule)), method);
         }
     }

@@ -146,7 +146,7 @@ fn orbit(v: [i32; 3]) -> Vec<[i32; 3]> {
     images
 }
 
-/// How a ray's samples become its ambient value (method.md §3, §4).
+/// By which rule what is met becomes a value: along a ray (method.md §3, §4), or of a method without rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quadrature {
     /// CAO eq. (2) as printed: each cell counts with its entry transmittance.
@@ -161,18 +161,30 @@ pub enum Quadrature {
     Nearest,
     /// Cells in whole numbers with trilinear opacity.
     Linear,
+    /// No rays: the product of what shells of cubes let through (SPAO §1.2.1).
+    Product,
+    /// Cones in steps of their own width, with mean opacities.
+    Cone,
 }
 
 impl Quadrature {
     /// Every rule.
-    pub const ALL: [Self; 6] =
-        [Self::Left, Self::Cell, Self::Segment, Self::Hybrid, Self::Nearest, Self::Linear];
+    pub const ALL: [Self; 8] = [
+        Self::Left,
+        Self::Cell,
+        Self::Segment,
+        Self::Hybrid,
+        Self::Nearest,
+        Self::Linear,
+        Self::Product,
+        Self::Cone,
+    ];
     /// Those of rays by the sampler, the paper's first.
     pub const CAST: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
     /// Those of rays by brick, the default first.
     pub const BRICK: [Self; 3] = [Self::Hybrid, Self::Nearest, Self::Linear];
 
-    /// Name on the command line: `left`, `cell`, `segment`, `hybrid`, `nearest`, `linear`.
+    /// Name on the command line: `left`, `cell`, `segment`, `hybrid`, `nearest`, `linear`, `product`, `cone`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -181,6 +193,8 @@ impl Quadrature {
             Self::Hybrid => "hybrid",
             Self::Nearest => "nearest",
             Self::Linear => "linear",
+            Self::Product => "product",
+            Self::Cone => "cone",
         }
     }
 
@@ -202,7 +216,7 @@ impl Quadrature {
 pub struct Occlusion {
     /// Directions and weights.
     pub rays: RaySet,
-    /// Rule along a ray.
+    /// Rule along a ray, or of a method without rays.
     pub quadrature: Quadrature,
     /// Radius of the neighbourhood in mm, ≥ 0; 0 leaves every voxel unoccluded.
     pub radius_mm: f32,

@@ -7,11 +7,14 @@
 
 pub mod cast;
 pub mod clip;
+pub mod cones;
 pub mod draw;
 pub mod features;
 pub mod field;
 pub mod measure;
+pub mod pyramid;
 pub mod rays;
+pub mod spao;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

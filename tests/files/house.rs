@@ -314,7 +314,13 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
     ("src/cao/features/", &["error", "host", "stages", "drive", "field", "subject", "by_brick", "rays"]),
-    ("src/cao/method.rs", &["error", "subject", "ambient", "by_brick", "cast", "features", "rays"]),
+    ("src/cao/pyramid/", &["error", "stages", "drive", "field"]),
+    ("src/cao/spao/", &["error", "stages", "drive", "field", "subject", "by_brick", "pyramid"]),
+    ("src/cao/cones/", &["error", "stages", "drive", "field", "subject", "by_brick", "pyramid"]),
+    (
+        "src/cao/method.rs",
+        &["error", "subject", "ambient", "by_brick", "cast", "cones", "features", "rays", "spao"],
+    ),
     ("src/cao/renderer.rs", &["error", "host", "drive", "field", "draw", "subject", "ambient", "method"]),
     ("src/cao/renderer/", &["ambient", "build", "clip", "draw", "drive", "error", "field", "stages"]),
     // Instruments take the renderer.

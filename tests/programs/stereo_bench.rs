@@ -4,7 +4,7 @@
 use crate::support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 
-const METHODS: [&str; 6] = ["solid", "fdao", "lao", "cao", "cao-literal", "rays"];
+const METHODS: [&str; 8] = ["solid", "fdao", "spao", "cones", "lao", "cao", "cao-literal", "rays"];
 
 /// The smallest run that has percentiles and runs to compare.
 const TINY: &str = "builtin:engine:16 --radius-mm 3 --rays 6 --size 32x24 --frames 3 --runs 2 --warm-up 1";
@@ -69,14 +69,24 @@ fn check_method(method: &Value, name: &str, table: &Table) {
         let wall = table.number(row, "frame_ms");
         assert!(sum >= wall - 1e-3 && sum < 1.1 * wall + 0.1, "{name}: {sum} of {wall}");
     }
-    assert_eq!(method["quadrature"], if name == "rays" { "hybrid" } else { "left" });
+    let by_brick = ["spao", "cones", "rays"].contains(&name);
+    let rule = match name {
+        "spao" => "product",
+        "cones" => "cone",
+        "rays" => "hybrid",
+        _ => "left",
+    };
+    assert_eq!(method["quadrature"], rule);
     let stages = method["stages_ms"].as_object().unwrap();
     for (stage, there) in [
-        ("classify", name != "rays"),
-        ("carve", name == "rays"),
+        ("classify", !by_brick),
+        ("carve", by_brick),
+        ("level 1", ["spao", "cones"].contains(&name)),
+        ("cones", name == "cones"),
+        ("product", name == "spao"),
         ("raycast", true),
         ("lao", name == "lao"),
-        ("contextual", !["lao", "rays"].contains(&name)),
+        ("contextual", name != "lao" && !by_brick),
         ("rays", name == "rays"),
         ("opacity", false),
     ] {
@@ -108,8 +118,8 @@ fn every_method_is_timed_for_one_two_and_four_views() {
         for (method, name) in methods.iter().zip(METHODS) {
             check_method(method, name, &table);
         }
-        assert_eq!(number(&methods[1]["lao_over_this"]), 1.0);
-        assert!(number(&methods[2]["affected_share"]) > 0.0, "the clip does nothing");
+        assert_eq!(number(&methods[3]["lao_over_this"]), 1.0);
+        assert!(number(&methods[3]["affected_share"]) > 0.0, "the clip does nothing");
     }
 }
 
@@ -183,7 +193,7 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid lao cao cao-literal rays, rays 6"),
+        ("method", "solid spao cones lao cao cao-literal rays, rays 6"),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),
@@ -353,7 +363,7 @@ fn what_cannot_be_measured_is_refused_before_a_device_is_asked_for() {
     folder.put("cube.nrrd", nrrd("uchar", "2 2 2", "1 1 1", &[0, 50, 100, 150, 200, 250, 20, 30]));
     for (arguments, code, words) in [
         ("--views 3", 2, "expected 1, 2 or 4"),
-        ("--methods lao,vray", 2, "expected one of solid, lao, cao, cao-literal, rays"),
+        ("--methods lao,vray", 2, "expected one of solid, spao, cones, lao, cao, cao-literal, rays"),
         ("--methods lao,lao", 2, "lao is given twice"),
         ("--scale colour", 2, "expected one of size, rays, radius, resolution, views"),
         ("--scale rays,rays", 2, "rays is given twice"),

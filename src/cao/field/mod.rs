@@ -190,8 +190,13 @@ fn texels(volume: &Volume, format: Format, range: std::ops::Range<usize>) -> Vec
 
 /// A 3D image of the field's size that kernels sample and store to.
 pub fn volume_image(gpu: &Gpu, name: &str, field: &Field, format: Format) -> cao_gpu::Result<Image> {
+    volume_of(gpu, name, field.dims, format)
+}
+
+/// One of another size.
+pub fn volume_of(gpu: &Gpu, name: &str, dims: [u32; 3], format: Format) -> cao_gpu::Result<Image> {
     let usage = ImageUse::SAMPLED | ImageUse::STORAGE;
-    gpu.image(name, &ImageDesc { dims: field.dims, layers: 1, format, kind: ImageKind::D3, usage })
+    gpu.image(name, &ImageDesc { dims, layers: 1, format, kind: ImageKind::D3, usage })
 }
 
 #[cfg(test)]

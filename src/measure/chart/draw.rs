@@ -8,8 +8,9 @@ use super::{Change, Chart, Point, SceneChart};
 use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
 use cao_model::occlusion::Quadrature;
 
-/// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
-const COLOURS: [&str; 6] = ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73"];
+/// Colours that stay apart for the colour-blind (Okabe and Ito 2008, their yellow darker, on white), in the order of the methods after "solid colour".
+const COLOURS: [&str; 8] =
+    ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#56b4e9", "#b8a800", "#009e73"];
 pub(super) const GREY: &str = "#777777";
 pub(super) const FRONT: &str = "#aaaaaa";
 
@@ -139,13 +140,14 @@ fn shape(quadrature: Option<Quadrature>) -> Marker {
         Some(Quadrature::Nearest) => Marker::Down,
         Some(Quadrature::Hybrid) => Marker::Right,
         Some(Quadrature::Linear) => Marker::Left,
-        None => Marker::Diamond,
+        Some(Quadrature::Cone) => Marker::Hexagon,
+        Some(Quadrature::Product) | None => Marker::Diamond,
     }
 }
 
 /// Equal weights, as in the paper.
 fn hollow(point: &Point) -> bool {
-    point.setting.quadrature.is_some() && !point.setting.label.contains('w')
+    shape(point.setting.quadrature) != shape(None) && !point.setting.label.contains('w')
 }
 
 fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) {
@@ -229,6 +231,11 @@ pub(super) fn label(
     }
 }
 
+/// Rules that have a mark of their own.
+fn rules_of_rays() -> impl Iterator<Item = Quadrature> {
+    Quadrature::ALL.into_iter().filter(|rule| shape(Some(*rule)) != shape(None))
+}
+
 fn legend(drawing: &mut Drawing, top: f64, methods: &[&str]) {
     let mut x = LEFT;
     let mut entry = |drawing: &mut Drawing, text: &str, mark: &mut dyn FnMut(&mut Drawing, f64)| {
@@ -244,7 +251,9 @@ fn legend(drawing: &mut Drawing, top: f64, methods: &[&str]) {
     }
     // Each row: text, its mark or none for the line of the front, hollow.
     type Entry = (String, Option<Marker>, bool);
-    let rules = Quadrature::ALL.map(|rule| (format!("{} rule", rule.name()), Some(shape(Some(rule))), false));
+    let rules: Vec<Entry> = rules_of_rays()
+        .map(|rule| (format!("{} rule", rule.name()), Some(shape(Some(rule))), false))
+        .collect();
     let others: [Entry; 4] = [
         ("equal weights".into(), Some(Marker::Circle), true),
         ("weighted rays".into(), Some(Marker::Circle), false),
@@ -276,11 +285,21 @@ mod tests {
     #[test]
     fn the_legend_stays_on_the_sheet_and_above_the_caption() {
         let mut drawing = Drawing::new(WIDTH, LEGEND);
-        let methods = ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"];
+        let methods = [
+            "solid colour",
+            "image space",
+            "LAO (unit)",
+            "LAO",
+            "CAO literal",
+            "CAO",
+            "SPAO",
+            "cones",
+            "rays",
+        ];
         legend(&mut drawing, 0.0, &methods);
         let svg = drawing.svg();
         let texts: Vec<_> = svg.split("<text ").skip(1).collect();
-        assert_eq!(texts.len(), methods.len() + Quadrature::ALL.len() + 4);
+        assert_eq!(texts.len(), methods.len() + rules_of_rays().count() + 4);
         for text in texts {
             let of = |name: &str| -> f64 {
                 let from = text.split(&format!("{name}=\"")).nth(1).unwrap();

@@ -2,7 +2,7 @@
 //! that it shows.
 
 use super::{Entrant, Known, Setting, Values};
-use crate::error::{Errors, errors};
+use crate::error::{Errors, errors, shape_errors};
 use cao::renderer::StereoImage;
 use cao_formats::Picture;
 use cao_model::methods::Method;
@@ -22,6 +22,8 @@ pub struct Shown {
     pub error: Picture,
     /// The same as numbers.
     pub errors: Errors,
+    /// What remains of them after the best affine fit of its tone.
+    pub shape: Errors,
 }
 
 /// Error at which the colours saturate.
@@ -31,7 +33,7 @@ pub const SATURATED: f32 = 0.2;
 pub(super) const BACKGROUND: [f32; 3] = [0.008_568_126, 0.009_721_218, 0.012_286_488];
 const NOTHING: [u8; 3] = [0xd8, 0xd8, 0xd8];
 
-/// One setting of each method: the default's own, 26 weighted rays with the segment rule where there are such, else the paper's 26, else any.
+/// One setting of each method: the default's own, 26 weighted rays with the segment rule where there are such, else the paper's 26, else the first of a rule, else any.
 pub(super) fn featured<'a>(
     entries: impl Iterator<Item = &'a Entrant> + Clone,
 ) -> Vec<(&'static str, Setting)> {
@@ -49,6 +51,7 @@ pub(super) fn featured<'a>(
             .find(|s| s.name() == ours)
             .or_else(|| own.iter().find(|s| s.label == "26w" && s.quadrature == Some(Quadrature::Segment)))
             .or_else(|| own.iter().find(|s| s.label == "26"))
+            .or_else(|| own.iter().find(|s| s.quadrature.is_some()))
             .unwrap_or(&own[own.len() / 2]);
         chosen.push((entry.method, (*best).clone()));
     }
@@ -74,12 +77,14 @@ impl Known {
             pixels[y * small[0] as usize + x] = diverging((value - expected) / SATURATED);
         }
         let expected: Vec<f32> = self.surface.iter().map(|(.., value)| *value).collect();
+        let counts = vec![true; expected.len()];
         Shown {
             method: entry.method,
             setting: entry.setting.clone(),
             picture: Picture::over(width, height, &image.colour[0], BACKGROUND),
             error: Picture { width: small[0], height: small[1], pixels },
-            errors: errors(&values, &expected, &vec![true; expected.len()]),
+            errors: errors(&values, &expected, &counts),
+            shape: shape_errors(&values, &expected, &counts).0,
         }
     }
 }

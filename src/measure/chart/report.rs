@@ -122,12 +122,13 @@ fn methods(chart: &Chart) -> Result<String> {
 fn figure(shown: &Shown) -> Result<String> {
     let e = &shown.errors;
     Ok(format!(
-        "<figure><img alt=\"picture\" src=\"{}\"><img class=\"error\" alt=\"error\" src=\"{}\"><figcaption><b>{}</b>, {}: RMSE {:.4}, bias {:+.4}, largest {:.3} at {} points of the surface</figcaption></figure>\n",
+        "<figure><img alt=\"picture\" src=\"{}\"><img class=\"error\" alt=\"error\" src=\"{}\"><figcaption><b>{}</b>, {}: RMSE {:.4}, tone fitted {:.4}, bias {:+.4}, largest {:.3} at {} points of the surface</figcaption></figure>\n",
         data(&shown.picture.png()?),
         data(&shown.error.png()?),
         escaped(shown.method),
         escaped(&shown.setting.name()),
         e.rmse,
+        shown.shape.rmse,
         e.bias,
         e.max,
         e.count

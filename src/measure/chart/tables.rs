@@ -93,13 +93,16 @@ pub(super) fn table_1(chart: &Chart) -> String {
                     _ => "no cost".into(),
                 }
             };
-            let mut row = vec![escaped(mark.of.method), escaped(&mark.of.setting.name()), short(mark.error)];
+            let shape = mean(&scenes, mark, &|p| Some(p.shape.rmse));
+            let mut row =
+                vec![escaped(mark.of.method), escaped(&mark.of.setting.name()), short(mark.error), shape];
             row.extend([Change::Radius, Change::Transfer, Change::Clip, Change::Volume].map(cell));
             row
         })
         .collect();
     let head = ["author", "method", "quality", "radius", "transfer function", "clipping"];
-    let own = ["method", "setting", "RMSE", "radius", "transfer function", "clipping", "new volume"];
+    let own =
+        ["method", "setting", "RMSE", "tone fitted", "radius", "transfer function", "clipping", "new volume"];
     format!(
         "<p>As printed: may it change in real time?</p>\n{}<p>Measured here, {}:</p>\n{}",
         table(&head, 6, &printed),
@@ -239,18 +242,20 @@ pub(super) fn figure_9(chart: &Chart) -> Drawing {
     drawing
 }
 
+/// The mean over the scenes of a number of a mark's contender after its change, if all have it.
+fn mean(scenes: &[&SceneChart], mark: &Mark, of: &dyn Fn(&Point) -> Option<f64>) -> String {
+    let (change, method, setting) = (mark.of.change, mark.of.method, &mark.of.setting);
+    let same = |p: &&Point| p.change == change && p.method == method && p.setting == *setting;
+    let points = scenes.iter().filter_map(|scene| scene.points.iter().find(same));
+    let values: Option<Vec<f64>> = points.map(of).collect();
+    values.map_or("–".into(), |v| format!("{:.4}", v.iter().sum::<f64>() / v.len().max(1) as f64))
+}
+
 /// Every contender after one kind of change, over all scenes.
 pub(super) fn everything(chart: &Chart, change: Change) -> String {
     let scenes: Vec<&SceneChart> = chart.scenes.iter().collect();
     let marks = draw::marks(&scenes, change, chart.software);
     let front = draw::front_of(&marks);
-    let mean = |mark: &Mark, of: &dyn Fn(&Point) -> Option<f64>| {
-        let same =
-            |p: &&Point| p.change == change && p.method == mark.of.method && p.setting == mark.of.setting;
-        let points = scenes.iter().filter_map(|scene| scene.points.iter().find(same));
-        let values: Option<Vec<f64>> = points.map(of).collect();
-        values.map_or("–".into(), |v| format!("{:.4}", v.iter().sum::<f64>() / v.len().max(1) as f64))
-    };
     let rows: Vec<Vec<String>> = marks
         .iter()
         .enumerate()
@@ -262,10 +267,10 @@ pub(super) fn everything(chart: &Chart, change: Change) -> String {
                 escaped(&mark.of.setting.name()),
                 if mark.time[1] > 0.0 { time(chart, mark.time) } else { "no cost".into() },
                 format!("{:.4}", mark.error),
-                mean(mark, &|p| Some(p.shape.rmse)),
-                mean(mark, &|p| Some(p.errors.bias)),
-                mean(mark, &largest),
-                mean(mark, &|p| p.ssim_3d),
+                mean(&scenes, mark, &|p| Some(p.shape.rmse)),
+                mean(&scenes, mark, &|p| Some(p.errors.bias)),
+                mean(&scenes, mark, &largest),
+                mean(&scenes, mark, &|p| p.ssim_3d),
                 escaped(&mark.of.setting.details),
             ]
         })

@@ -16,6 +16,9 @@ pub struct Listed {
     pub ray: f64,
     /// Its ray sets for a first look: the cheapest and the dearest, and those of the default size.
     pub few: &'static [RaySet],
+    /// Whether such values are means over half the sphere: 1 at a flat wall, where the others and the reference have about ½. Errors are
+    /// those of half the values, and pictures have half the gain.
+    pub half_sphere: fn(&Options) -> bool,
 }
 
 impl Listed {
@@ -32,8 +35,11 @@ impl Listed {
         let rays = rules.iter().flat_map(|&quadrature| {
             sets.iter().map(move |&rays| Occlusion { rays, quadrature, ..own.occlusion })
         });
+        // For a first look every other option: with the entry's order, one of each kind.
+        let every = if asked.quick { 2 } else { 1 };
         let settings = rays.flat_map(|occlusion| {
-            self.method.variants().map(move |options| Setup { occlusion, options, ..own })
+            let variants = self.method.variants().step_by(every);
+            variants.map(move |options| Setup { occlusion, options, ..own })
         });
         settings.map(|setup| self.entrant(name, setup, asked)).collect()
     }
@@ -41,9 +47,25 @@ impl Listed {
     fn entrant(&self, name: &'static str, setup: Setup, asked: &Asked) -> Entrant {
         let occlusion = &setup.occlusion;
         let mut setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
-        for (option, value) in setup.options.other_than(&Options::DEFAULT) {
-            setting.label += &format!(" {option} {value}");
+        let given = setup.options.other_than(&Options::DEFAULT);
+        let mut options: Vec<String> =
+            given.iter().map(|(option, value)| format!("{option} {value}")).collect();
+        if occlusion.rays == RaySet::None {
+            // The method's first option says what it is, its own value too.
+            let entry = self.method.entry();
+            if let (true, Some(first)) = (given.is_empty(), entry.options.first()) {
+                options.extend(setup.options.value(first).map(|value| format!("{first} {value}")));
+            }
+            setting.details = self.computes.to_owned();
+        } else {
+            options.insert(0, occlusion.rays.name());
         }
-        rendered::entrant(name, setup, setting, self.ray * occlusion.rays.count() as f64)
+        setting.label = options.join(" ");
+        let half_sphere = (self.half_sphere)(&setup.options);
+        if half_sphere {
+            setting.details += ", halved";
+        }
+        let work = self.ray * occlusion.rays.count().max(1) as f64;
+        rendered::entrant(name, setup, setting, work, half_sphere)
     }
 }

@@ -25,7 +25,7 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 8] = [
+static CONTENDERS: [Kind; 10] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
@@ -36,6 +36,7 @@ static CONTENDERS: [Kind; 8] = [
             computes: "bricks that show and changed, of each feature",
             ray: 0.08,
             few: &[RaySet::Spiral(50)],
+            half_sphere: |_| false,
         }),
     },
     Kind {
@@ -45,6 +46,7 @@ static CONTENDERS: [Kind; 8] = [
             computes: "voxels that show recomputed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            half_sphere: |_| false,
         }),
     },
     Kind { name: "CAO literal", enters: Enters::By(paper::literal) },
@@ -55,6 +57,27 @@ static CONTENDERS: [Kind; 8] = [
             computes: "voxels that show and changed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            half_sphere: |_| false,
+        }),
+    },
+    Kind {
+        name: "SPAO",
+        enters: Enters::As(Listed {
+            method: Method::Spao,
+            computes: "levels anew, bricks that show and changed",
+            ray: 1.0,
+            few: &[RaySet::None],
+            half_sphere: |options| options.normal > 0.0,
+        }),
+    },
+    Kind {
+        name: "cones",
+        enters: Enters::As(Listed {
+            method: Method::Cones,
+            computes: "levels anew, bricks that show and changed",
+            ray: 0.1,
+            few: &[RaySet::W14, RaySet::W26],
+            half_sphere: |_| false,
         }),
     },
     Kind {
@@ -64,6 +87,7 @@ static CONTENDERS: [Kind; 8] = [
             computes: "bricks that show and changed",
             ray: 0.05,
             few: &[RaySet::Spiral(14), RaySet::Spiral(50), RaySet::Spiral(96)],
+            half_sphere: |_| false,
         }),
     },
 ];
@@ -277,18 +301,31 @@ mod tests {
         let names = CONTENDERS.each_ref().map(|kind| kind.name);
         assert_eq!(
             names,
-            ["solid colour", "image space", "LAO (unit)", "fdAO", "LAO", "CAO literal", "CAO", "rays"]
+            [
+                "solid colour",
+                "image space",
+                "LAO (unit)",
+                "fdAO",
+                "LAO",
+                "CAO literal",
+                "CAO",
+                "SPAO",
+                "cones",
+                "rays"
+            ]
         );
         assert_eq!(
             METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(),
-            ["fdAO", "LAO", "CAO", "rays"]
+            ["fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
         );
-        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(names.map(place), std::array::from_fn(|place| place));
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in [(true, [1, 1, 4, 2, 8, 2, 8, 6]), (false, [1, 3, 4, 3, 21, 4, 21, 15])] {
+        for (quick, counts) in
+            [(true, [1, 1, 4, 2, 8, 2, 8, 3, 2, 6]), (false, [1, 3, 4, 3, 21, 4, 21, 6, 2, 15])]
+        {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

@@ -1,0 +1,4 @@
+//! Cone tracing (docs/cones.md).
+
+pub mod cone;
+pub mod traced;

@@ -1,0 +1,3 @@
+//! Cone tracing.
+
+pub mod cone;

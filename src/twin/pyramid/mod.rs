@@ -1,0 +1,3 @@
+//! Volumes of mean opacities over cubes.
+
+pub mod level;

@@ -1,0 +1,3 @@
+//! Smooth probabilistic ambient occlusion.
+
+pub mod product;
