@@ -128,6 +128,7 @@ fn storage_format(format: StorageFormat) -> Option<Format> {
         StorageFormat::R8Unorm => Format::R8Unorm,
         StorageFormat::R8Uint => Format::R8Uint,
         StorageFormat::R16Unorm => Format::R16Unorm,
+        StorageFormat::R16Uint => Format::R16Uint,
         StorageFormat::R16Float => Format::R16Float,
         StorageFormat::R32Float => Format::R32Float,
         StorageFormat::R32Uint => Format::R32Uint,

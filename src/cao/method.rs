@@ -5,8 +5,11 @@ use crate::ambient::Ambient;
 use crate::by_brick::ByBrick;
 use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
+use crate::histograms::clustered::Clustered;
 use crate::rays::traced::Traced;
 use crate::subject::Subject;
+use crate::tables::summed::Summed;
+use crate::vicinity::shaded::Shaded;
 use cao_model::methods::Method;
 
 /// What the library knows of a method beside its entry in [`cao_model::METHODS`].
@@ -30,6 +33,26 @@ const MAKERS: &[Maker] = &[
     },
     // Changes are found in the opacities; nothing is dilated.
     Maker { method: Method::Rays, new: |on| Ok(Box::new(ByBrick::<Traced>::new(on)?)), map_radius: |_| None },
+    Maker {
+        method: Method::Sat,
+        new: |on| Ok(Box::new(ByBrick::<Summed<false>>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Shells,
+        new: |on| Ok(Box::new(ByBrick::<Summed<true>>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Vicinity,
+        new: |on| Ok(Box::new(ByBrick::<Shaded>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Histograms,
+        new: |on| Ok(Box::new(ByBrick::<Clustered>::new(on)?)),
+        map_radius: |_| None,
+    },
 ];
 
 fn maker(on: &Subject) -> &'static Maker {

@@ -174,6 +174,7 @@ impl Renderer {
         // Values that are refused change nothing; where the device fails some may be there.
         if !matches!(written, Err(Error::Model(_))) {
             self.edited(Changed { opacities: true, ..Changed::NOTHING });
+            self.subject.values += 1;
         }
         written
     }

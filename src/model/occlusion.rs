@@ -146,7 +146,7 @@ fn orbit(v: [i32; 3]) -> Vec<[i32; 3]> {
     images
 }
 
-/// How a ray's samples become its ambient value (method.md §3, §4).
+/// How a ray's samples become its ambient value (method.md §3, §4), or how a method without rays makes one of what it looks up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quadrature {
     /// CAO eq. (2) as printed: each cell counts with its entry transmittance.
@@ -161,18 +161,44 @@ pub enum Quadrature {
     Nearest,
     /// Cells in whole numbers with trilinear opacity.
     Linear,
+    /// What the mean opacity of a box lets through.
+    Box,
+    /// The mean transmittance through shells of boxes, each of one extinction.
+    Mean,
+    /// The transmittance behind the last shell.
+    End,
+    /// The extinction of shells over the squares of their distances, as it was published.
+    Published,
+    /// The share of directions in which nothing more opaque lies.
+    Visible,
+    /// The opacity of a neighbourhood's histogram.
+    Histogram,
 }
 
 impl Quadrature {
     /// Every rule.
-    pub const ALL: [Self; 6] =
-        [Self::Left, Self::Cell, Self::Segment, Self::Hybrid, Self::Nearest, Self::Linear];
+    pub const ALL: [Self; 12] = [
+        Self::Left,
+        Self::Cell,
+        Self::Segment,
+        Self::Hybrid,
+        Self::Nearest,
+        Self::Linear,
+        Self::Box,
+        Self::Mean,
+        Self::End,
+        Self::Published,
+        Self::Visible,
+        Self::Histogram,
+    ];
     /// Those of rays by the sampler, the paper's first.
     pub const CAST: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
     /// Those of rays by brick, the default first.
     pub const BRICK: [Self; 3] = [Self::Hybrid, Self::Nearest, Self::Linear];
+    /// Those of shells, the default first.
+    pub const SHELLS: [Self; 3] = [Self::Mean, Self::End, Self::Published];
 
-    /// Name on the command line: `left`, `cell`, `segment`, `hybrid`, `nearest`, `linear`.
+    /// Name on the command line: `left`, say, or `hybrid`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -181,6 +207,12 @@ impl Quadrature {
             Self::Hybrid => "hybrid",
             Self::Nearest => "nearest",
             Self::Linear => "linear",
+            Self::Box => "box",
+            Self::Mean => "mean",
+            Self::End => "end",
+            Self::Published => "published",
+            Self::Visible => "visible",
+            Self::Histogram => "histogram",
         }
     }
 

@@ -9,8 +9,11 @@ pub mod cast;
 pub mod clip;
 pub mod draw;
 pub mod field;
+pub mod histograms;
 pub mod measure;
 pub mod rays;
+pub mod tables;
+pub mod vicinity;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -313,7 +313,19 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
-    ("src/cao/method.rs", &["error", "subject", "ambient", "by_brick", "cast", "rays"]),
+    (
+        "src/cao/tables/",
+        &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"],
+    ),
+    (
+        "src/cao/histograms/",
+        &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"],
+    ),
+    ("src/cao/vicinity/", &["error", "stages", "drive", "field", "subject", "by_brick"]),
+    (
+        "src/cao/method.rs",
+        &["error", "subject", "ambient", "by_brick", "cast", "histograms", "rays", "tables", "vicinity"],
+    ),
     ("src/cao/renderer.rs", &["error", "host", "drive", "field", "draw", "subject", "ambient", "method"]),
     ("src/cao/renderer/", &["ambient", "build", "clip", "draw", "drive", "error", "field", "stages"]),
     // Instruments take the renderer.

@@ -1,15 +1,19 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
 mod bounds;
+mod boxes;
 mod brick_distance;
 mod bricks;
 mod carve;
 mod classify;
 mod clip_bricks;
 mod clipping;
+mod clusters;
 mod dilate;
+mod expand;
 mod extent;
 mod filter;
+mod histogram;
 mod lao;
 mod near;
 mod occupancy;
@@ -22,3 +26,5 @@ mod rays;
 mod reference;
 mod shading;
 mod ssao;
+mod sums;
+mod vicinity;

@@ -17,7 +17,19 @@ use cao_model::view::StereoRig;
 use cao_testing::{close, open};
 use std::collections::BTreeMap;
 
-const METHODS: [&str; 7] = ["solid colour", "image space", BASELINE, "LAO", "CAO literal", "CAO", "rays"];
+const METHODS: [&str; 11] = [
+    "solid colour",
+    "image space",
+    BASELINE,
+    "LAO",
+    "CAO literal",
+    "CAO",
+    "rays",
+    "SAT",
+    "shells",
+    "vicinity",
+    "histograms",
+];
 const RUNS: u32 = 2;
 
 fn scene(name: &str) -> Scene {

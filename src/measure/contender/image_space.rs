@@ -5,7 +5,7 @@
 //! a sphere where the others shade all of it; twice their ambient factor is what it stands for, and so its values are halved.
 
 use super::rendered::{change_to, with_radius};
-use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values, surface_look};
+use super::{Arena, Asked, Change, Contender, Entrant, HALF_SPHERE, Setting, State, Values, surface_look};
 use crate::Result;
 use crate::kernels::ssao::Ssao;
 use cao::renderer::{COLOUR, Renderer, StereoImage, Target, Targets};
@@ -20,9 +20,6 @@ const IMAGE_SPACE: Stage = Stage::new("image space", Phase::Ambient);
 
 /// A surface hides a point only if it is nearer by more than this many voxels: what the step of the rays that drew it leaves open.
 const BIAS_VOXELS: f64 = 0.25;
-
-/// A flat wall has 1 here and 1/2 in data space.
-const HALF_SPHERE: f32 = 0.5;
 
 /// Numbers of points in the hemisphere.
 pub fn entrants(name: &'static str, asked: &Asked) -> Vec<Entrant> {

@@ -1,6 +1,6 @@
 //! Contenders that are methods of [`cao_model::METHODS`], each with the ray sets and rules of its entry.
 
-use super::{Asked, Entrant, Setting, rendered};
+use super::{Asked, Entrant, HALF_SPHERE, Setting, rendered};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::Options;
@@ -16,6 +16,8 @@ pub struct Listed {
     pub ray: f64,
     /// Its ray sets for a first look: the cheapest and the dearest, and those of the default size.
     pub few: &'static [RaySet],
+    /// Whether a flat wall has 1, as where half a sphere is shaded; all data-space references have 1/2, so its values are halved.
+    pub halved: bool,
 }
 
 impl Listed {
@@ -32,18 +34,31 @@ impl Listed {
         let rays = rules.iter().flat_map(|&quadrature| {
             sets.iter().map(move |&rays| Occlusion { rays, quadrature, ..own.occlusion })
         });
+        // For a first look without variants.
+        let variants = if asked.quick { 1 } else { entry.variants.len() };
         let settings = rays.flat_map(|occlusion| {
-            self.method.variants().map(move |options| Setup { occlusion, options, ..own })
+            self.method.variants().take(variants).map(move |options| Setup { occlusion, options, ..own })
         });
         settings.map(|setup| self.entrant(name, setup, asked)).collect()
     }
 
     fn entrant(&self, name: &'static str, setup: Setup, asked: &Asked) -> Entrant {
         let occlusion = &setup.occlusion;
-        let mut setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
+        let mut setting = match occlusion.rays {
+            RaySet::None => Setting {
+                label: occlusion.quadrature.name().into(),
+                quadrature: None,
+                details: self.computes.into(),
+            },
+            _ => Setting::rays(occlusion, asked.min_spacing, self.computes),
+        };
+        if self.halved {
+            setting.details += ", halved";
+        }
         for (option, value) in setup.options.other_than(&Options::DEFAULT) {
             setting.label += &format!(" {option} {value}");
         }
-        rendered::entrant(name, setup, setting, self.ray * occlusion.rays.count() as f64)
+        let work = self.ray * occlusion.rays.count().max(1) as f64;
+        rendered::entrant(name, setup, setting, work, if self.halved { HALF_SPHERE } else { 1.0 })
     }
 }

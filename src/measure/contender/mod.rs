@@ -25,7 +25,7 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 7] = [
+static CONTENDERS: [Kind; 11] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
@@ -36,6 +36,7 @@ static CONTENDERS: [Kind; 7] = [
             computes: "voxels that show recomputed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            halved: false,
         }),
     },
     Kind { name: "CAO literal", enters: Enters::By(paper::literal) },
@@ -46,6 +47,7 @@ static CONTENDERS: [Kind; 7] = [
             computes: "voxels that show and changed",
             ray: 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
+            halved: false,
         }),
     },
     Kind {
@@ -55,6 +57,47 @@ static CONTENDERS: [Kind; 7] = [
             computes: "bricks that show and changed",
             ray: 0.05,
             few: &[RaySet::Spiral(14), RaySet::Spiral(50), RaySet::Spiral(96)],
+            halved: false,
+        }),
+    },
+    Kind {
+        name: "SAT",
+        enters: Enters::As(Listed {
+            method: Method::Sat,
+            computes: "whole table, bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::None],
+            halved: false,
+        }),
+    },
+    Kind {
+        name: "shells",
+        enters: Enters::As(Listed {
+            method: Method::Shells,
+            computes: "whole table, bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::None],
+            halved: false,
+        }),
+    },
+    Kind {
+        name: "vicinity",
+        enters: Enters::As(Listed {
+            method: Method::Vicinity,
+            computes: "bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::W50],
+            halved: true,
+        }),
+    },
+    Kind {
+        name: "histograms",
+        enters: Enters::As(Listed {
+            method: Method::Histograms,
+            computes: "12 voxels at most, as if nothing were clipped; new values cluster anew",
+            ray: 1.0,
+            few: &[RaySet::None],
+            halved: false,
         }),
     },
 ];
@@ -82,6 +125,9 @@ impl Kind {
         }
     }
 }
+
+/// What methods that shade half a sphere count in data space, where all of it is shaded: a flat wall has 1 in the ones, 1/2 in the others.
+const HALF_SPHERE: f32 = 0.5;
 
 /// Name of no ambient occlusion, the paper's "solid colour" (CAO §4).
 pub const SOLID: &str = "solid colour";
@@ -266,14 +312,30 @@ mod tests {
     #[test]
     fn names_stay() {
         let names = CONTENDERS.each_ref().map(|kind| kind.name);
-        assert_eq!(names, ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"]);
-        assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "rays"]);
-        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(
+            names,
+            [
+                "solid colour",
+                "image space",
+                "LAO (unit)",
+                "LAO",
+                "CAO literal",
+                "CAO",
+                "rays",
+                "SAT",
+                "shells",
+                "vicinity",
+                "histograms"
+            ]
+        );
+        let listed: Vec<_> = METHODS.iter().map(|e| name(e.method)).collect();
+        assert_eq!(listed, ["SAT", "shells", "vicinity", "histograms", "LAO", "CAO", "rays"]);
+        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 6]), (false, [1, 3, 4, 21, 4, 21, 15])] {
+        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 6, 1, 2, 1, 1]), (false, [1, 3, 4, 21, 4, 21, 15, 1, 12, 3, 3])] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

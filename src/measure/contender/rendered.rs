@@ -8,13 +8,13 @@ use cao_gpu::Timings;
 use cao_model::look::Look;
 use cao_model::settings::Setup;
 
-/// One whose renderer has this setup.
-pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64) -> Entrant {
+/// One whose renderer has this setup, and whose values count so much.
+pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64, counts: f32) -> Entrant {
     Entrant {
         method: name,
         setting,
         work,
-        open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, state)?))),
+        open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, counts, state)?))),
     }
 }
 
@@ -22,16 +22,17 @@ struct Rendered<'a> {
     arena: Arena<'a>,
     renderer: Renderer,
     setup: Setup,
+    counts: f32,
 }
 
 impl<'a> Rendered<'a> {
-    fn open(arena: Arena<'a>, setup: Setup, state: &State) -> Result<Self> {
+    fn open(arena: Arena<'a>, setup: Setup, counts: f32, state: &State) -> Result<Self> {
         let setup = with_radius(setup, state.radius_mm);
         let (transfer, volume) = (state.transfer.clone(), arena.volume);
         let mut renderer = Renderer::new(arena.gpu, volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         renderer.update(&mut |_| ())?;
-        Ok(Self { arena, renderer, setup })
+        Ok(Self { arena, renderer, setup, counts })
     }
 }
 
@@ -64,10 +65,15 @@ impl Contender for Rendered<'_> {
     }
 
     fn ambient(&self) -> Result<Values> {
-        Ok(Values::Voxels(self.renderer.read_ambient()?))
+        let mut values = self.renderer.read_ambient()?;
+        if self.counts != 1.0 {
+            values.iter_mut().for_each(|value| *value *= self.counts);
+        }
+        Ok(Values::Voxels(values))
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        Ok(self.renderer.draw(self.arena.views, look, self.arena.size)?)
+        let look = Look { gain: look.gain * self.counts, ..*look };
+        Ok(self.renderer.draw(self.arena.views, &look, self.arena.size)?)
     }
 }
