@@ -129,6 +129,7 @@ fn storage_format(format: StorageFormat) -> Option<Format> {
         StorageFormat::R8Uint => Format::R8Uint,
         StorageFormat::R16Unorm => Format::R16Unorm,
         StorageFormat::Rgba16Unorm => Format::Rgba16Unorm,
+        StorageFormat::R16Uint => Format::R16Uint,
         StorageFormat::R16Float => Format::R16Float,
         StorageFormat::R32Float => Format::R32Float,
         StorageFormat::R32Uint => Format::R32Uint,

@@ -9,6 +9,8 @@ pub enum Format {
     R8Uint,
     /// One 16-bit channel, 0…65535 read as 0…1.
     R16Unorm,
+    /// One 16-bit unsigned integer.
+    R16Uint,
     /// One half float.
     R16Float,
     /// One float.
@@ -48,6 +50,7 @@ impl Format {
             Self::R8Unorm => (1, Texel::Float),
             Self::R8Uint => (1, Texel::Uint),
             Self::R16Unorm | Self::R16Float => (2, Texel::Float),
+            Self::R16Uint => (2, Texel::Uint),
             Self::R32Float => (4, Texel::Float),
             Self::R32Uint => (4, Texel::Uint),
             Self::Rg32Float => (8, Texel::Float),

@@ -30,6 +30,8 @@ pub trait Gather: Send + Sync + Sized {
 
     /// Format of V_AO.
     const FORMAT: Format = Format::R16Unorm;
+    /// Whether values are of V and the transfer function, and not of V_o alone: then an edit of these concerns every one.
+    const OF_VALUES: bool = false;
 
     /// For the subject's settings. Uses the device's queue and waits for it.
     ///
@@ -64,9 +66,10 @@ pub trait Gather: Send + Sync + Sized {
         None
     }
 
-    /// What it makes of V_o, as it is now, before it computes values of the bricks of any list: its own volumes, for instance.
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image) -> Vec<Part<'a>> {
-        let _ = (on, opacity);
+    /// What it makes of V_o, as it is now and after these changes, before it computes values of the bricks of any list: its own volumes,
+    /// for instance. As many parts each time: an update that spans frames counts them.
+    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, changed: Changed) -> Vec<Part<'a>> {
+        let _ = (on, opacity, changed);
         Vec::new()
     }
 
@@ -169,6 +172,9 @@ impl Kernels {
     }
 }
 
+/// What a recomputation takes for changed: what is made of opacities, too.
+const RECOMPUTED: Changed = Changed { opacities: true, anew: true, ..Changed::NOTHING };
+
 /// A method that computes values brick by brick.
 pub struct ByBrick<G> {
     kernels: Kernels,
@@ -188,6 +194,11 @@ impl<G: Gather> ByBrick<G> {
             volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::FORMAT)?,
             gather,
         })
+    }
+
+    /// Whether every value has to be computed after these changes.
+    fn anew(changed: Changed) -> bool {
+        changed.anew || G::OF_VALUES && changed.opacities
     }
 
     fn target<'a>(&'a self, on: &'a Subject, list: &'a BrickList, ambient: &'a Image) -> Target<'a> {
@@ -281,8 +292,8 @@ impl<G: Gather> Ambient for ByBrick<G> {
         if changed.features {
             parts.extend(self.gather.changed(on, &v.change));
         }
-        parts.extend(self.gather.prepare(on, &v.opacity));
-        parts.extend([self.choose(to, &v.todo, changed.anew), self.compute(to)]);
+        parts.extend(self.gather.prepare(on, &v.opacity, changed));
+        parts.extend([self.choose(to, &v.todo, Self::anew(changed)), self.compute(to)]);
         parts
     }
 
@@ -293,7 +304,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
 
     fn written(&self, changed: Changed) -> Written<'_> {
         // Anew the others are ones again.
-        Written { list: &self.volumes.list, all: changed.anew }
+        Written { list: &self.volumes.list, all: Self::anew(changed) }
     }
 
     fn fields(&self) -> Fields<'_> {
@@ -311,7 +322,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         let list = BrickList::new(&on.gpu, &on.field)?;
         let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
         let to = self.target(on, &list, into);
-        let mut parts = self.gather.prepare(on, &v.opacity);
+        let mut parts = self.gather.prepare(on, &v.opacity, RECOMPUTED);
         parts.extend([self.choose(to, &todo, true), self.compute(to)]);
         let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);

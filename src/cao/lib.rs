@@ -7,7 +7,7 @@
 //!
 //! ```text
 //! volume ─ Renderer::new ─ [occupancy] ─ [opacity, clips, ambient: the method] ─ [distances] ─ [raycast, all views] ─ image / engine's swapchain
-//!           field/           field/        cast/ features/ rays/, with clip/          draw/         draw/
+//!           field/           field/        a room a method, with clip/             draw/         draw/
 //! ```
 //!
 //! # The modules
@@ -17,7 +17,7 @@
 //! | [`model`] | plain data, another crate: volumes, transfer functions, clips, views, settings, [`METHODS`]. Files come by `cao-formats` |
 //! | [`gpu`] | Vulkan and nothing else, another crate: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
 //! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
-//! | [`cast`] [`features`] [`rays`] | the methods, a room each: kernels' host sides, and what there is to do after a change |
+//! | [`cast`] [`rays`] [`features`] [`spao`] [`cones`] [`tables`] [`vicinity`] [`histograms`] | the methods, a room each: kernels' host sides, and what there is to do after a change; [`pyramid`]: what two of them share |
 //! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
 //! | [`by_brick`] | what methods have in common that compute brick by brick from V_o alone |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
@@ -72,6 +72,7 @@ pub mod drive;
 pub mod error;
 pub mod features;
 pub mod field;
+pub mod histograms;
 pub mod host;
 pub mod method;
 pub mod pyramid;
@@ -80,7 +81,9 @@ pub mod renderer;
 pub mod spao;
 pub mod stages;
 pub mod subject;
+pub mod tables;
 pub mod verify;
+pub mod vicinity;
 
 pub use cao_gpu as gpu;
 pub use cao_model as model;

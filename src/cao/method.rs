@@ -7,9 +7,12 @@ use crate::cast::contextual::Contextual;
 use crate::cast::full::Full;
 use crate::cones::traced::Cones;
 use crate::features::driven::Driven;
+use crate::histograms::clustered::Clustered;
 use crate::rays::traced::Traced;
 use crate::spao::shells::Shells;
 use crate::subject::Subject;
+use crate::tables::summed::Summed;
+use crate::vicinity::shaded::Shaded;
 use cao_model::methods::Method;
 
 /// What the library knows of a method beside its entry in [`cao_model::METHODS`].
@@ -41,6 +44,26 @@ const MAKERS: &[Maker] = &[
     Maker { method: Method::Spao, new: |on| Ok(Box::new(ByBrick::<Shells>::new(on)?)), map_radius: |_| None },
     // Changes are found in the opacities; nothing is dilated.
     Maker { method: Method::Rays, new: |on| Ok(Box::new(ByBrick::<Traced>::new(on)?)), map_radius: |_| None },
+    Maker {
+        method: Method::Sat,
+        new: |on| Ok(Box::new(ByBrick::<Summed<false>>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Shells,
+        new: |on| Ok(Box::new(ByBrick::<Summed<true>>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Vicinity,
+        new: |on| Ok(Box::new(ByBrick::<Shaded>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Histograms,
+        new: |on| Ok(Box::new(ByBrick::<Clustered>::new(on)?)),
+        map_radius: |_| None,
+    },
 ];
 
 fn maker(on: &Subject) -> &'static Maker {

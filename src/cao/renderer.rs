@@ -195,6 +195,7 @@ impl Renderer {
         if !matches!(written, Err(Error::Model(_))) {
             let features = self.subject.features.follow_values();
             self.edited(Changed { opacities: true, features, ..Changed::NOTHING });
+            self.subject.values += 1;
         }
         written
     }

@@ -56,6 +56,24 @@ pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 pub const LABELS: Stage = Stage::new("labels", Phase::Ambient);
 /// Rays of features of the bricks within reach of a change.
 pub const FDAO: Stage = Stage::new("fdao", Phase::Ambient);
+/// The table of shells.
+pub const SHELLS: Stage = Stage::new("shells", Phase::Prepare);
+/// The summed-area table.
+pub const SUMS: Stage = Stage::new("sums", Phase::Ambient);
+/// Lines of these bricks.
+pub const LINES: Stage = Stage::new("lines", Phase::Ambient);
+/// Boxes of these bricks.
+pub const BOXES: Stage = Stage::new("boxes", Phase::Ambient);
+/// Histograms of samples.
+pub const HISTOGRAMS: Stage = Stage::new("histograms", Phase::Ambient);
+/// Their clusters.
+pub const CLUSTERS: Stage = Stage::new("clusters", Phase::Ambient);
+/// The cluster of every voxel.
+pub const ASSIGN: Stage = Stage::new("assign", Phase::Ambient);
+/// Ambient factors of the clusters.
+pub const SHADE: Stage = Stage::new("shade", Phase::Ambient);
+/// Those of the voxels of these bricks.
+pub const EXPAND: Stage = Stage::new("expand", Phase::Ambient);
 /// What a build made of several frames is shown.
 pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 /// How far rays of the picture may leap.

@@ -25,6 +25,8 @@ pub struct Subject {
     pub gpu: Gpu,
     /// The volume.
     pub field: Field,
+    /// Which values it has: another number after each change of them.
+    pub values: u64,
     /// Bricks that can have opacity, u32 each.
     pub occupancy: Buffer,
     /// Opacity and colour, as kernels read them.
@@ -65,6 +67,7 @@ impl Subject {
             transfer,
             clips: Vec::new(),
             classes: Classes::new(gpu)?,
+            values: 0,
             occupancy_kernel: Occupancy::new(gpu)?,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,

@@ -20,6 +20,7 @@ impl VulkanFormat for Format {
             Format::R8Unorm => vk::Format::R8_UNORM,
             Format::R8Uint => vk::Format::R8_UINT,
             Format::R16Unorm => vk::Format::R16_UNORM,
+            Format::R16Uint => vk::Format::R16_UINT,
             Format::R16Float => vk::Format::R16_SFLOAT,
             Format::R32Float => vk::Format::R32_SFLOAT,
             Format::R32Uint => vk::Format::R32_UINT,

@@ -9,6 +9,14 @@ use crate::{Error, Result};
 /// A method of ambient occlusion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
+    /// The mean opacity of a box around each voxel, from a summed-area table.
+    Sat,
+    /// Shells of such boxes.
+    Shells,
+    /// Directions in which nothing more opaque lies.
+    Vicinity,
+    /// Histograms of neighbourhoods, in clusters.
+    Histograms,
     /// Local ambient occlusion of each feature by itself; equal to computing everything bit for bit.
     FeatureDriven,
     /// Local ambient occlusion of the clipped volume, every voxel.
@@ -54,6 +62,62 @@ pub struct Entry {
 
 /// Every method, the one to use first last.
 pub static METHODS: &[Entry] = &[
+    Entry {
+        method: Method::Sat,
+        name: "sat",
+        title: "Summed-area table",
+        what: "the mean opacity of a box around each voxel",
+        source: "after Díaz",
+        rays: RaySet::None,
+        quadratures: &[Quadrature::Box],
+        sets: &[RaySet::None],
+        options: &[],
+        variants: &[&[]],
+        contextual: true,
+        same_values_as: Method::Sat,
+    },
+    Entry {
+        method: Method::Shells,
+        name: "shells",
+        title: "Shells of a summed-area table",
+        what: "mean opacities of shells of boxes, behind one another",
+        source: "after Schlegel",
+        rays: RaySet::None,
+        quadratures: &Quadrature::SHELLS,
+        sets: &[RaySet::None],
+        options: &["shells"],
+        variants: &[&[], &[("shells", "4")], &[("shells", "8")], &[("shells", "32")]],
+        contextual: true,
+        same_values_as: Method::Shells,
+    },
+    Entry {
+        method: Method::Vicinity,
+        name: "vicinity",
+        title: "Vicinity shading",
+        what: "directions of a hemisphere in which nothing more opaque lies",
+        source: "after Stewart",
+        rays: RaySet::W50,
+        quadratures: &[Quadrature::Visible],
+        sets: &[RaySet::W26, RaySet::W50, RaySet::Spiral(96)],
+        options: &[],
+        variants: &[&[]],
+        contextual: true,
+        same_values_as: Method::Vicinity,
+    },
+    Entry {
+        method: Method::Histograms,
+        name: "histograms",
+        title: "Clustered local histograms",
+        what: "histograms of the unclipped neighbourhoods, in clusters",
+        source: "after Ropinski",
+        rays: RaySet::None,
+        quadratures: &[Quadrature::Histogram],
+        sets: &[RaySet::None],
+        options: &["clusters"],
+        variants: &[&[], &[("clusters", "256")], &[("clusters", "4096")]],
+        contextual: true,
+        same_values_as: Method::Histograms,
+    },
     Entry {
         method: Method::FeatureDriven,
         name: "fdao",
@@ -206,6 +270,11 @@ impl Method {
         (self.rays() == RaySet::None) == (rays == RaySet::None)
     }
 
+    /// These rays where it follows such, else its own.
+    pub fn rays_like(self, rays: RaySet) -> RaySet {
+        if self.follows(rays) { rays } else { self.rays() }
+    }
+
     /// The options that charts and the planner try.
     pub fn variants(self) -> impl Iterator<Item = Options> {
         let listed = self.entry().variants.iter();
@@ -230,8 +299,19 @@ mod tests {
 
     #[test]
     fn every_method_has_one_entry_and_is_found_by_its_name() {
-        let all =
-            [Method::FeatureDriven, Method::Spao, Method::Cones, Method::Lao, Method::Cao, Method::Rays];
+        let all = [
+            Method::Sat,
+            Method::Shells,
+            Method::Vicinity,
+            Method::Histograms,
+            Method::FeatureDriven,
+            Method::Spao,
+            Method::Cones,
+            Method::Lao,
+            Method::Cao,
+            Method::Rays,
+        ];
+        assert_eq!(all.len(), METHODS.len());
         for method in all {
             assert_eq!(METHODS.iter().filter(|entry| entry.method == method).count(), 1);
             assert_eq!(Method::parse(method.name()), Ok(method));
@@ -259,11 +339,16 @@ mod tests {
     fn who_names_no_method_gets_the_one_that_has_his_rule() {
         assert_eq!(Method::default(), Method::Rays);
         for rule in Quadrature::ALL {
+            // Rules of rays have several methods, others one.
             let method = match rule {
+                Quadrature::Left | Quadrature::Cell | Quadrature::Segment => Method::Cao,
+                Quadrature::Hybrid | Quadrature::Nearest | Quadrature::Linear => Method::Rays,
+                Quadrature::Box => Method::Sat,
+                Quadrature::Mean | Quadrature::End | Quadrature::Published => Method::Shells,
+                Quadrature::Visible => Method::Vicinity,
+                Quadrature::Histogram => Method::Histograms,
                 Quadrature::Product => Method::Spao,
                 Quadrature::Cone => Method::Cones,
-                rule if Quadrature::CAST.contains(&rule) => Method::Cao,
-                _ => Method::Rays,
             };
             assert_eq!(Method::for_rule(Some(rule)), method);
         }

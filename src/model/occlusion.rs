@@ -146,7 +146,7 @@ fn orbit(v: [i32; 3]) -> Vec<[i32; 3]> {
     images
 }
 
-/// By which rule what is met becomes a value: along a ray (method.md §3, §4), or of a method without rays.
+/// How a ray's samples become its ambient value (method.md §3, §4), or how a method without rays makes one of what it looks up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quadrature {
     /// CAO eq. (2) as printed: each cell counts with its entry transmittance.
@@ -165,11 +165,23 @@ pub enum Quadrature {
     Product,
     /// Cones in steps of their own width, with mean opacities.
     Cone,
+    /// What the mean opacity of a box lets through.
+    Box,
+    /// The mean transmittance through shells of boxes, each of one extinction.
+    Mean,
+    /// The transmittance behind the last shell.
+    End,
+    /// The extinction of shells over the squares of their distances, as it was published.
+    Published,
+    /// The share of directions in which nothing more opaque lies.
+    Visible,
+    /// The opacity of a neighbourhood's histogram.
+    Histogram,
 }
 
 impl Quadrature {
     /// Every rule.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 14] = [
         Self::Left,
         Self::Cell,
         Self::Segment,
@@ -178,13 +190,21 @@ impl Quadrature {
         Self::Linear,
         Self::Product,
         Self::Cone,
+        Self::Box,
+        Self::Mean,
+        Self::End,
+        Self::Published,
+        Self::Visible,
+        Self::Histogram,
     ];
     /// Those of rays by the sampler, the paper's first.
     pub const CAST: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
     /// Those of rays by brick, the default first.
     pub const BRICK: [Self; 3] = [Self::Hybrid, Self::Nearest, Self::Linear];
+    /// Those of shells, the default first.
+    pub const SHELLS: [Self; 3] = [Self::Mean, Self::End, Self::Published];
 
-    /// Name on the command line: `left`, `cell`, `segment`, `hybrid`, `nearest`, `linear`, `product`, `cone`.
+    /// Name on the command line: `left`, say, or `hybrid`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Left => "left",
@@ -195,6 +215,12 @@ impl Quadrature {
             Self::Linear => "linear",
             Self::Product => "product",
             Self::Cone => "cone",
+            Self::Box => "box",
+            Self::Mean => "mean",
+            Self::End => "end",
+            Self::Published => "published",
+            Self::Visible => "visible",
+            Self::Histogram => "histogram",
         }
     }
 

@@ -11,10 +11,13 @@ pub mod cones;
 pub mod draw;
 pub mod features;
 pub mod field;
+pub mod histograms;
 pub mod measure;
 pub mod pyramid;
 pub mod rays;
 pub mod spao;
+pub mod tables;
+pub mod vicinity;
 
 /// Shape of every field of a volume: values in x-fastest order, voxel centres at integer index coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]

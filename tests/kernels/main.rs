@@ -1,19 +1,23 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
 mod bounds;
+mod boxes;
 mod brick_distance;
 mod bricks;
 mod carve;
 mod classify;
 mod clip_bricks;
 mod clipping;
+mod clusters;
 mod cone;
 mod dilate;
+mod expand;
 mod extent;
 mod fdao;
 mod feature_colour;
 mod features;
 mod filter;
+mod histogram;
 mod labels;
 mod lao;
 mod level;
@@ -30,3 +34,5 @@ mod rays;
 mod reference;
 mod shading;
 mod ssao;
+mod sums;
+mod vicinity;

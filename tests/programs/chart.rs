@@ -18,8 +18,22 @@ use cao_testing::{close, open};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-const METHODS: [&str; 10] =
-    ["solid colour", "image space", BASELINE, "fdAO", "LAO", "CAO literal", "CAO", "SPAO", "cones", "rays"];
+const METHODS: [&str; 14] = [
+    "solid colour",
+    "image space",
+    BASELINE,
+    "fdAO",
+    "LAO",
+    "CAO literal",
+    "CAO",
+    "SPAO",
+    "cones",
+    "rays",
+    "SAT",
+    "shells",
+    "vicinity",
+    "histograms",
+];
 const RUNS: u32 = 2;
 /// How far off foreseen minutes may be.
 const FORESEEN: f64 = 8.0;

@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, anisotropy, concave, cut, dilation, motion, numbers, pixels, radius, sheets,
-    stereo, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, motion, noise, numbers,
+    pixels, radius, sheets, shells, stereo, tables, views,
 };
 use cao_testing::{close, open};
 
@@ -188,4 +188,45 @@ fn odd_eyes_see_no_holes_and_the_same_shading() {
     assert_eq!(curve(&finding, 0, "rays that begin").at(2.2), 0.0);
     assert!(curve(&finding, 1, "taken").at(0.0) <= views::SAME_RAYS, "not shifted is symmetric");
     close(gpu);
+}
+
+#[test]
+fn tables_of_floats_lose_small_boxes_and_whole_numbers_none() {
+    let plan = tables::Plan { edge: 96, boxes: 300, radii: vec![1, 4, 16] };
+    let finding = tables::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let floats = curve(&finding, 0, "table of floats");
+    assert!(floats.at(1.0) > 10.0 * floats.at(16.0), "{}", finding.sentence);
+    // A small volume's floats are exact enough: the trial can tell.
+    let small = tables::run(&tables::Plan { edge: 10, radii: vec![1], ..plan }, &mut |_| ()).unwrap();
+    assert!(!small.control_fails, "{}", small.sentence);
+}
+
+#[test]
+fn more_shells_make_a_wall_darker_than_it_is() {
+    let plan = shells::Plan { shells: vec![1, 4, 32], directions: 400 };
+    let finding = shells::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    // What was computed for a radius of 16 voxels, 0.218, is no other at 32.
+    assert!(
+        (curve(&finding, 0, "the ambient integral").at(1.0) - 0.218).abs() < 0.03,
+        "{}",
+        finding.sentence
+    );
+}
+
+#[test]
+fn noise_turns_directions_of_vicinity_shading_on_and_off() {
+    let finding = noise::run(&noise::Plan { edge: 20, sigmas: vec![0.0, 2.0, 8.0] }, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    assert_eq!(curve(&finding, 0, "vicinity").at(0.0), 0.0);
+    assert!(curve(&finding, 0, "vicinity").at(8.0) > 0.1, "{}", finding.sentence);
+}
+
+#[test]
+fn an_opaque_sheet_is_nearly_nothing_to_a_histogram() {
+    let finding = absorption::run(&absorption::Plan { radii: vec![3, 12] }, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let histograms = curve(&finding, 0, "local histograms");
+    assert!(histograms.at(12.0) < 0.5 * histograms.at(3.0), "{}", finding.sentence);
 }

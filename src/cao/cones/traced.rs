@@ -2,6 +2,7 @@
 
 use super::cone::{Bindings, ConePlan, ConeTracing};
 use crate::Result;
+use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
 use crate::pyramid::levels::{LevelImages, MakeLevels};
@@ -61,7 +62,7 @@ impl Gather for Cones {
         }))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, _: Changed) -> Vec<Part<'a>> {
         self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
     }
 

@@ -13,16 +13,17 @@ use cao_kernels::shared::bricks::BRICK;
 pub struct Ones {
     halves: Pipeline,
     floats: Pipeline,
+    fours: Pipeline,
 }
 
 impl Ones {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
-        Ok(Self { halves: pipeline("halves")?, floats: pipeline("floats")? })
+        Ok(Self { halves: pipeline("halves")?, floats: pipeline("floats")?, fours: pipeline("fours")? })
     }
 
-    /// Fills a volume, r16unorm or r32float.
+    /// Fills a volume, r16unorm, r32float, or rgba16unorm where the device stores it.
     pub fn record(&self, rec: &mut Recorder, volume: &Image) -> Result<()> {
         let dims = volume.desc().dims;
         let params = kernel::OnesParams { dims, pad: Default::default() };
@@ -31,6 +32,9 @@ impl Ones {
         match volume.desc().format {
             Format::R16Unorm => {
                 rec.dispatch(&self.halves, &kernel::HalvesBindings { halves_out: volume }, push, groups)
+            }
+            Format::Rgba16Unorm => {
+                rec.dispatch(&self.fours, &kernel::FoursBindings { fours_out: volume }, push, groups)
             }
             _ => rec.dispatch(&self.floats, &kernel::FloatsBindings { floats_out: volume }, push, groups),
         }

@@ -2,6 +2,7 @@
 
 use super::product::{Bindings, Product};
 use crate::Result;
+use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
 use crate::pyramid::levels::{LevelImages, MakeLevels};
@@ -69,7 +70,7 @@ impl Gather for Shells {
         Some(Part::short(stages::TABLE, |rec| Ok(self.make.record_table(rec, &self.levels.plan)?)))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, _: Changed) -> Vec<Part<'a>> {
         self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
     }
 

@@ -62,9 +62,7 @@ impl Way {
         if !setup.method.has(setup.occlusion.quadrature) {
             setup.occlusion.quadrature = setup.method.quadrature();
         }
-        if !setup.method.follows(setup.occlusion.rays) {
-            setup.occlusion.rays = setup.method.rays();
-        }
+        setup.occlusion.rays = setup.method.rays_like(setup.occlusion.rays);
         setup
     }
 
@@ -90,7 +88,9 @@ mod tests {
     #[test]
     fn names_stay_and_every_method_is_there() {
         let names: Vec<_> = Way::all().into_iter().map(Way::name).collect();
-        assert_eq!(names, ["solid", "spao", "cones", "lao", "cao", "cao-literal", "rays"]);
+        let methods = ["sat", "shells", "vicinity", "histograms", "fdao", "spao", "cones"];
+        let ways = methods.into_iter().chain(["lao", "cao", "cao-literal", "rays"]);
+        assert_eq!(names, std::iter::once("solid").chain(ways).collect::<Vec<_>>());
         for way in Way::all() {
             assert_eq!(Way::parse(way.name()), Ok(way));
         }

@@ -25,7 +25,7 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 10] = [
+static CONTENDERS: [Kind; 14] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
@@ -87,6 +87,46 @@ static CONTENDERS: [Kind; 10] = [
             computes: "bricks that show and changed",
             ray: 0.05,
             few: &[RaySet::Spiral(14), RaySet::Spiral(50), RaySet::Spiral(96)],
+            half_sphere: |_| false,
+        }),
+    },
+    Kind {
+        name: "SAT",
+        enters: Enters::As(Listed {
+            method: Method::Sat,
+            computes: "whole table, bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::None],
+            half_sphere: |_| false,
+        }),
+    },
+    Kind {
+        name: "shells",
+        enters: Enters::As(Listed {
+            method: Method::Shells,
+            computes: "whole table, bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::None],
+            half_sphere: |_| false,
+        }),
+    },
+    Kind {
+        name: "vicinity",
+        enters: Enters::As(Listed {
+            method: Method::Vicinity,
+            computes: "bricks that show and changed",
+            ray: 0.05,
+            few: &[RaySet::W50],
+            half_sphere: |_| true,
+        }),
+    },
+    Kind {
+        name: "histograms",
+        enters: Enters::As(Listed {
+            method: Method::Histograms,
+            computes: "12 voxels at most, as if nothing were clipped; new values cluster anew",
+            ray: 1.0,
+            few: &[RaySet::None],
             half_sphere: |_| false,
         }),
     },
@@ -311,21 +351,26 @@ mod tests {
                 "CAO",
                 "SPAO",
                 "cones",
-                "rays"
+                "rays",
+                "SAT",
+                "shells",
+                "vicinity",
+                "histograms"
             ]
         );
+        let listed: Vec<_> = METHODS.iter().map(|e| name(e.method)).collect();
         assert_eq!(
-            METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(),
-            ["fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
+            listed,
+            ["SAT", "shells", "vicinity", "histograms", "fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
         );
         assert_eq!(names.map(place), std::array::from_fn(|place| place));
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in
-            [(true, [1, 1, 4, 2, 8, 2, 8, 3, 2, 6]), (false, [1, 3, 4, 3, 21, 4, 21, 6, 2, 15])]
-        {
+        let quick = [1, 1, 4, 2, 8, 2, 8, 1, 2, 6, 1, 2, 1, 1];
+        let full = [1, 3, 4, 3, 21, 4, 21, 6, 2, 15, 1, 12, 3, 3];
+        for (quick, counts) in [(true, quick), (false, full)] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

@@ -5,18 +5,22 @@
 //! failed at which value, made from the numbers alone. A trial in which nothing fails shows nothing, so that each
 //! carries its own control: a method that is known to fail there.
 
+pub mod absorption;
 pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
 pub mod motion;
+pub mod noise;
 pub mod numbers;
 pub mod page;
 pub mod pixels;
 mod plane_cut;
 pub mod radius;
 pub mod sheets;
+pub mod shells;
 pub mod stereo;
+pub mod tables;
 pub mod views;
 
 use crate::Result;
@@ -178,7 +182,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 11] = [
+pub const TRIALS: [Trial; 15] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -233,6 +237,26 @@ pub const TRIALS: [Trial; 11] = [
         name: "views",
         title: "Do odd eyes see holes, or each another picture?",
         run: |gpu, effort, progress| views::run(gpu, &views::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "tables",
+        title: "How wrong are means from a summed-area table of floats?",
+        run: |_, effort, progress| tables::run(&tables::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "shells",
+        title: "Do more shells make a wall darker?",
+        run: |_, effort, progress| shells::run(&shells::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "noise",
+        title: "How much does noise in the values change the shading?",
+        run: |_, effort, progress| noise::run(&noise::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "absorption",
+        title: "Does an opaque sheet hide what lies behind it?",
+        run: |_, effort, progress| absorption::run(&absorption::Plan::of(effort), progress),
     },
 ];
 

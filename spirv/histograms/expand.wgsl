@@ -1,0 +1,83 @@
+// From clusters to values: `shade` makes one ambient factor a cluster, of the opacities that the transfer function gives to its values;
+// `main` writes them to the voxels of a list of bricks. Expanded before anything filters them: numbers of clusters cannot be interpolated.
+
+struct ExpandParams {
+    dims: vec3<u32>,
+    // voxels along each axis that share a cluster
+    block: u32,
+    bricks: vec3<u32>,
+    // first entry of the list to work on
+    base: u32,
+    clusters: u32,
+    // 1: every voxel gets a value
+    unneeded: u32,
+    // reference lengths of a voxel's smallest spacing
+    exponent: f32,
+}
+
+struct Range {
+    // of values, ordered as whole numbers
+    low: u32,
+    high: u32,
+}
+
+struct Factors {
+    all: array<f32>,
+}
+
+#include "shared/solid.wgsl"
+#include "shared/nearest.wgsl"
+#include "shared/transfer.wgsl"
+
+var<immediate> params: ExpandParams;
+@group(0) @binding(3) var<storage, read> range_of: Range;
+@group(0) @binding(4) var<storage, read_write> factors: Factors;
+@group(0) @binding(5) var<storage, read> list: BrickList;
+@group(0) @binding(6) var index: texture_3d<u32>;
+@group(0) @binding(7) var ambient: texture_storage_3d<r16unorm, write>;
+
+// Opacity of each bin.
+var<workgroup> alphas: array<f32, BINS>;
+
+fn value_of(ordered: u32) -> f32 {
+    return bitcast<f32>(select(~ordered, ordered & 0x7fffffffu, ordered >> 31u == 1u));
+}
+
+// One invocation a cluster.
+@compute @workgroup_size(EACH)
+fn shade(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let low = value_of(range_of.low);
+    let high = value_of(range_of.high);
+    // A bin's own value; the ends exactly.
+    let t = f32(lane) / f32(BINS - 1u);
+    let value = select(low * (1.0 - t) + high * t, high, lane == BINS - 1u);
+    let alpha = opacity_of(value);
+    alphas[lane] = select(1.0 - pow(max(1.0 - alpha, 0.0), params.exponent), alpha, params.exponent == 1.0);
+    workgroupBarrier();
+    if id.x < params.clusters {
+        var hidden = 0.0;
+        for (var w = 0u; w < WORDS; w++) {
+            let word = centres.all[WORDS * id.x + w];
+            hidden += f32(word & 0xffffu) * alphas[2u * w] + f32(word >> 16u) * alphas[2u * w + 1u];
+        }
+        factors.all[id.x] = clamp(1.0 - hidden / f32(WHOLE_SHARE), 0.0, 1.0);
+    }
+}
+
+@compute @workgroup_size(TEAM)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let entry = params.base + item_of_group(group);
+    let listed = entry < list.count;
+    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
+    find_solid(corner, params.dims, lane);
+    for (var i = lane; i < VOXELS; i += TEAM) {
+        let voxel = corner + inside(i);
+        if listed && all(voxel < params.dims) {
+            var value = 1.0;
+            if params.unneeded == 1u || needed(inside(i)) {
+                value = factors.all[textureLoad(index, voxel / params.block, 0).r];
+            }
+            textureStore(ambient, voxel, vec4(value, 0.0, 0.0, 0.0));
+        }
+    }
+}

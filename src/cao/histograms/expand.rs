@@ -1,0 +1,115 @@
+//! From clusters to values (docs/histograms.md): `A_c = 1 − Σ_j α_j LH_cj` for every cluster c, α_j the transfer function's opacity of bin j
+//! in a smallest spacing; then every voxel of the listed bricks that needs a value takes its cluster's.
+//!
+//! In: the clusters, the range of values, the transfer function; `opacity` V_o, for which voxels need a value; the index volume, the list.
+//! Out: `ambient` V_AO (3D r16unorm) in the listed bricks, one write a voxel. Cost: two reads a voxel.
+
+use super::histogram::HistogramPlan;
+use crate::drive::Take;
+use crate::field::Field;
+use crate::field::bricks::BrickList;
+use cao_gpu::Result;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
+use cao_kernels::expand as kernel;
+use cao_model::options::Options;
+use cao_model::settings::Scope;
+
+/// What both entry points know.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Clusters and what they stand for.
+    pub plan: &'a HistogramPlan,
+    /// Reference length of the transfer function's opacities in mm.
+    pub reference_mm: f32,
+    /// Which voxels get a value.
+    pub scope: Scope,
+}
+
+/// What the kernel reads and writes.
+#[derive(Clone, Copy)]
+pub struct Bindings<'a> {
+    /// V_o.
+    pub opacity: &'a Image,
+    /// Number of each voxel's cluster.
+    pub index: &'a Image,
+    /// Bricks to work on.
+    pub list: &'a BrickList,
+    /// V_AO.
+    pub ambient: &'a Image,
+}
+
+/// The kernel `expand`.
+pub struct Expand {
+    shade: Pipeline,
+    main: Pipeline,
+    factors: Buffer,
+}
+
+impl Expand {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
+        Ok(Self {
+            shade: pipeline("shade")?,
+            main: pipeline("main")?,
+            factors: gpu.buffer(
+                "factors of clusters",
+                4 * u64::from(Options::MOST_CLUSTERS),
+                BufferUse::Device,
+            )?,
+        })
+    }
+
+    /// The ambient factors of all clusters.
+    pub fn record_shade(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        scene: Scene,
+        [range_of, centres, transfer]: [&Buffer; 3],
+    ) -> Result<()> {
+        let params = params(field, scene, 0);
+        let binds = kernel::ShadeBindings { transfer, centres, range_of, factors: &self.factors };
+        rec.barrier(
+            &[Access::StorageRead, Access::StorageWrite],
+            &[Access::StorageRead, Access::StorageWrite],
+        );
+        let groups = [scene.plan.clusters.div_ceil(kernel::EACH), 1, 1];
+        rec.dispatch(&self.shade, &binds, bytemuck::bytes_of(&params), groups)?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+        Ok(())
+    }
+
+    /// Works on the list, or some of its bricks, with the factors recorded last.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        field: &Field,
+        scene: Scene,
+        b: Bindings,
+        take: &Take,
+    ) -> Result<()> {
+        let params = params(field, scene, take.first());
+        let binds = kernel::MainBindings {
+            opacity: b.opacity,
+            factors: &self.factors,
+            list: &b.list.buffer,
+            index: b.index,
+            ambient: b.ambient,
+        };
+        take.dispatch(rec, &self.main, &binds, bytemuck::bytes_of(&params), &b.list.buffer)
+    }
+}
+
+fn params(field: &Field, scene: Scene, base: u32) -> kernel::ExpandParams {
+    kernel::ExpandParams {
+        dims: field.dims,
+        block: scene.plan.block,
+        bricks: field.bricks(),
+        base,
+        clusters: scene.plan.clusters,
+        unneeded: u32::from(scene.scope == Scope::All),
+        exponent: field.min_spacing() / scene.reference_mm,
+        pad: Default::default(),
+    }
+}

@@ -1,0 +1,5 @@
+//! Methods `sat` and `shells`: boxes of a summed-area table.
+
+pub mod boxes;
+pub mod summed;
+pub mod sums;

@@ -1,0 +1,5 @@
+//! Clustered local histograms.
+
+pub mod clusters;
+pub mod expand;
+pub mod histogram;

@@ -1,0 +1,4 @@
+//! Summed-area tables and their boxes.
+
+pub mod boxes;
+pub mod sums;
