@@ -9,6 +9,8 @@ pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
+pub mod labels;
+pub mod layers;
 pub mod motion;
 pub mod numbers;
 pub mod page;
@@ -178,7 +180,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 11] = [
+pub const TRIALS: [Trial; 13] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -213,6 +215,16 @@ pub const TRIALS: [Trial; 11] = [
         name: "radius",
         title: "How dark do inner layers become as the radius grows?",
         run: |_, effort, progress| radius::run(&radius::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "layers",
+        title: "Does each layer's shading depend on the layers around it?",
+        run: |_, effort, progress| layers::run(&layers::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "labels",
+        title: "What does a segmentation that is off do to feature-driven occlusion?",
+        run: |gpu, effort, progress| labels::run(gpu, &labels::Plan::of(effort), progress),
     },
     Trial {
         name: "sheets",
