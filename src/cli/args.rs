@@ -380,8 +380,8 @@ mod tests {
     fn help_reads_the_list_of_methods() {
         let text = methods_help();
         assert!(METHODS.iter().all(|e| text.contains(&format!("{}: {}", e.name, e.what))), "{text}");
-        assert!(rays_help().ends_with("[default: lao, cao: 26; rays: spiral:50]"), "{}", rays_help());
-        let rules = "lao, cao: left, cell, segment; rays: hybrid, nearest, linear]";
+        assert!(rays_help().ends_with("[default: fdao, rays: spiral:50; lao, cao: 26]"), "{}", rays_help());
+        let rules = "fdao, rays: hybrid, nearest, linear; lao, cao: left, cell, segment]";
         assert!(quadrature_help().ends_with(rules), "{}", quadrature_help());
     }
 }

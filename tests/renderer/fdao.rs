@@ -105,7 +105,7 @@ fn pictures_show_a_feature_in_its_own_light() {
         Features::by_labels(vec![floor, wall], grid.dims, labels.clone()).unwrap()
     };
     let look = Look { shading: Shading::Ao, gain: 1.0, ..Look::default() };
-    let mut changed = |rule: &str| {
+    let changed = |rule: &str| {
         let mut renderer = renderer(&gpu, &volume, &transfer, Method::FeatureDriven, 10.0);
         combine(&mut renderer, rule);
         let mut picture = |visible| {

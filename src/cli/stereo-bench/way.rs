@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn names_stay_and_every_method_is_there() {
         let names: Vec<_> = Way::all().into_iter().map(Way::name).collect();
-        assert_eq!(names, ["solid", "lao", "cao", "cao-literal", "rays"]);
+        assert_eq!(names, ["solid", "fdao", "lao", "cao", "cao-literal", "rays"]);
         for way in Way::all() {
             assert_eq!(Way::parse(way.name()), Ok(way));
         }
