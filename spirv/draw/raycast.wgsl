@@ -140,15 +140,16 @@ fn value_at(position: vec3<f32>) -> f32 {
     return texel * frame.scale + frame.bias;
 }
 
-// Direction of steepest rise of the values, in texels a voxel; of what clips leave, differences over two voxels.
+// Direction of steepest rise of the values; of what clips leave, by the same filter, place by place.
 fn rise_at(position: vec3<f32>) -> vec3<f32> {
     if !only_spared {
         return texel_gradient(position);
     }
     var rise = vec3(0.0);
-    for (var i = 0u; i < 6u; i++) {
-        let way = vec3<f32>(vec3(i >> 1u) == vec3(0u, 1u, 2u)) * select(-1.0, 1.0, (i & 1u) == 1u);
-        rise += way * kept_at(position + way);
+    for (var i = 0u; i < 27u; i++) {
+        let step = vec3<f32>(vec3(i % 3u, i / 3u % 3u, i / 9u)) - 1.0;
+        let weight = select(vec3(1.0), vec3(MIDDLE), step == vec3(0.0));
+        rise += step * weight.yzx * weight.zxy * kept_at(position + step);
     }
     return rise;
 }
@@ -262,13 +263,12 @@ fn segment(near: Sample, far: Sample, length: f32) -> Segment {
     return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
 }
 
-// Two segments one behind the other as one, the first of which has a share of the length.
+// Two segments of a volume with features, one behind the other, as one, the first of which has a share of the length.
 fn joined(a: Segment, b: Segment, share: f32) -> Segment {
     let behind = (1.0 - a.alpha) * b.alpha;
     let alpha = a.alpha + behind;
-    let colour = a.colour + (1.0 - a.alpha) * b.colour;
     let centre = a.alpha * a.centre * share + behind * mix(share, 1.0, b.centre);
-    return Segment(alpha, colour, select(0.5, centre / alpha, alpha > 0.0));
+    return Segment(alpha, vec3(0.0), select(0.5, centre / alpha, alpha > 0.0));
 }
 
 // Whether a step has to be halved, through which `open` of the light comes to the eye: its opacity is not that of its ends, because a
@@ -311,14 +311,13 @@ fn shown_part(ray: Ray, bricks: vec3<u32>) -> vec2<f32> {
     return vec2(clamp(floor((part.x - ray.begin) / ray.step - 1.5), 0.0, 1e8), min(ray.end, part.y + ray.step));
 }
 
-// A segment of a volume with features, whose values are opacities: from near to far, between two depths.
-fn segment_of_features(near: f32, far: f32, begin: f32, end: f32, start: vec3<f32>, along: vec3<f32>, per_depth: f32) -> Segment {
-    if max(near, far) <= 0.0 || end <= begin {
+// A segment of a volume with features, whose values are opacities. Its colour is found where it is lit.
+fn segment_of_features(near: f32, far: f32, length: f32) -> Segment {
+    if max(near, far) <= 0.0 || length <= 0.0 {
         return Segment(0.0, vec3(0.0), 0.5);
     }
-    let found = piece(near, far, (end - begin) * per_depth);
-    let alpha = 1.0 - found.x;
-    return Segment(alpha, alpha * colour_at(start + mix(begin, end, found.y) * along), found.y);
+    let found = piece(near, far, length);
+    return Segment(1.0 - found.x, vec3(0.0), found.y);
 }
 
 // A value as it is, of a volume with features.
@@ -440,9 +439,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
                 if spares && clips.count > 0u && !(shown_from && shown_to) {
                     let t_ends = vec2(select(t, sides.x, shown_from), select(t_next, sides.x, shown_to));
                     kept_ends = vec2(kept_at(start + t_ends.x * along), kept_at(start + t_ends.y * along));
-                    only_spared = true;
-                    kept = segment_of_features(kept_ends.x, kept_ends.y, t_ends.x, t_ends.y, start, along, slant / frame.light.w);
-                    only_spared = false;
+                    kept = segment_of_features(kept_ends.x, kept_ends.y, (t_ends.y - t_ends.x) * slant / frame.light.w);
                 }
                 if shows || kept.alpha > 0.0 {
                     var found = kept;
@@ -455,7 +452,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
                         to_sample = sample_of(far);
                         found = segment(from_sample, to_sample, length);
                     } else if shows {
-                        let open_part = segment_of_features(near, far, t_from, t_to, start, along, slant / frame.light.w);
+                        let open_part = segment_of_features(near, far, length);
                         found = open_part;
                         if spares && halves {
                             let share = (sides.x - t) / (t_next - t);
@@ -507,11 +504,15 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
         if spares && clips.count > 0u {
             only_spared = !visible_to(asked_at(start + t_shown * along, bricks), eye.origin.xyz + t_shown * ray.direction);
         }
+        var unlit = tint / stops;
+        if featured {
+            unlit = colour_at(start + t_shown * along);
+        }
         let at = Shown(
             start + t_shown * along,
             eye.origin.xyz + t_shown * ray.direction,
             centre.y / stops,
-            tint / stops,
+            unlit,
             // What clips leave whole they do not cut.
             select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,

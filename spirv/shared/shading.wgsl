@@ -101,8 +101,13 @@ fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
     let by_clip = at.cut != NO_CLIP && at.beside <= entered;
     let way = select(entered, at.beside, by_clip) / smallest_spacing();
     let cut = 1.0 - smoothstep(CUT_HOLDS, CUT_ENDS, way);
+    // Once: it is much code, and drivers write out every call.
+    var inside = vec2(0.0);
+    if cut < 1.0 {
+        inside = reflected_inside(at, towards_eye);
+    }
     if cut == 0.0 {
-        return reflected_inside(at, towards_eye);
+        return inside;
     }
     var normal = vec3(0.0);
     if by_clip {
@@ -115,7 +120,7 @@ fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
     if cut == 1.0 {
         return back;
     }
-    return mix(reflected_inside(at, towards_eye), back, cut);
+    return mix(inside, back, cut);
 }
 
 // Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.

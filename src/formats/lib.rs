@@ -14,6 +14,7 @@ mod foreign;
 mod grid;
 mod gzip;
 pub mod input;
+pub mod label;
 mod listing;
 mod metaimage;
 mod nifti;

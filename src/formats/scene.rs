@@ -22,8 +22,8 @@
 //!     rotate_deg = [0, 45, 0]          # about the fixed axes x, then y, then z
 //!     scale = 40                       # or one number an axis: [40, 40, 20]
 //!
-//!     ## label = "seg.nrrd"             # parts of the volume, by a label map or by values, and how each is shown: see [`feature`](crate::feature)
-//!     ## [[feature]]
+//!     ## label = "seg.nrrd"             # parts of the volume, by a label map or by values, and how each is shown: module `feature`
+//!     ## [[feature]]                    # none, or up to eight
 //!
 //!     [occlusion]
 //!     method = "rays"                  # rays by brick, where opacities change; "cao": rays, where clips change; "lao": all rays

@@ -233,6 +233,7 @@ fn a_dependency_on_something_below_is_caught() {
 const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/error.rs", &[]),
     ("src/model/values.rs", &[]),
+    ("src/model/feature.rs", &["error"]),
     ("src/model/view.rs", &["error"]),
     ("src/model/fit.rs", &["error", "view"]),
     ("src/model/transfer.rs", &["error", "values"]),
@@ -260,7 +261,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/polygon.rs", &[]),
     ("src/formats/obj.rs", &["error", "file", "polygon"]),
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
-    ("src/formats/scene.rs", &["error", "file", "obj", "reading", "toml_value", "transfer"]),
+    ("src/formats/feature.rs", &["error", "file", "toml_value"]),
+    ("src/formats/scene.rs", &["error", "feature", "file", "obj", "reading", "toml_value", "transfer"]),
     // The readers of volumes, and what refuses and assembles for all of them.
     ("src/formats/binary.rs", &[]),
     ("src/formats/gzip.rs", &[]),
@@ -278,6 +280,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("src/formats/listing.rs", &["error", "file", "volume"]),
     ("src/formats/foreign.rs", &[]),
+    ("src/formats/label.rs", &["error", "feature", "file", "listing", "nrrd", "reading", "volume"]),
     ("src/formats/tiff_stack.rs", &["error", "file", "grid", "reading", "volume"]),
     ("src/formats/dicom/", &["binary", "error", "file", "grid", "listing", "reading", "volume"]),
     (

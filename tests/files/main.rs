@@ -5,6 +5,7 @@ use cao_gpu as gpu;
 
 mod builtin;
 mod dicom;
+mod features;
 mod fuzz;
 mod hostile;
 mod house;

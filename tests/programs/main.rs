@@ -6,6 +6,7 @@ mod cli;
 mod cli_outputs;
 mod cli_refusals;
 mod dicom;
+mod features;
 mod gallery;
 mod orders;
 mod peers;

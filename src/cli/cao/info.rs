@@ -3,7 +3,7 @@
 use crate::args::{Global, Info};
 use anyhow::Result;
 use cao_cli::output::Out;
-use cao_formats::feature::segments;
+use cao_formats::label::segments;
 use cao_formats::scene::VolumeSource;
 use cao_model::frame::Turn;
 use cao_model::order::Layout;

@@ -183,6 +183,11 @@ fn pixel(
                 let hidden = frame.parts.filter(|_| !shown_at(t));
                 let shown = Shown { cut: shown.cut.filter(|_| hidden.is_none()), ..shown };
                 let left = Frame { values: hidden.map_or(frame.values, |parts| parts.spared), ..*frame };
+                // With features, of the place; else of the way.
+                let own = frame
+                    .parts
+                    .map(|parts| colour_at(&frame.grid, &parts, left.values, frame.transfer, shown.position));
+                let shown = Shown { colour: own.unwrap_or(shown.colour), ..shown };
                 colour += covered * shaded(&left, &shown, direction, light, ambient);
                 alpha += covered;
                 if depth == 1.0 && alpha >= 0.5 {
@@ -214,7 +219,7 @@ fn pixel(
         }
         let mut ends = [from, to];
         let mut values = ends.map(value_at);
-        let mut found = piece(frame, frame.values, at, ends, values);
+        let mut found = piece(frame, ends, values);
         if let Some(parts) = frame.parts.filter(|_| !(shown && stays)) {
             // What clips leave whole of what they hide.
             let [mut first, mut last] = [t, next];
@@ -223,7 +228,7 @@ fn pixel(
             }
             let kept_at = |t: f64| trilinear_clamped(&frame.grid, parts.spared, at(t)) as f32;
             let kept_values = [first, last].map(kept_at);
-            let kept = piece(frame, parts.spared, at, [first, last], kept_values);
+            let kept = piece(frame, [first, last], kept_values);
             ends = [t, next];
             (found, values) = match hidden_at {
                 None => (kept, kept_values),
@@ -255,18 +260,9 @@ fn pixel(
     ([colour.x as f32, colour.y as f32, colour.z as f32, alpha as f32], depth as f32)
 }
 
-/// A segment between two depths, at which voxels of these values or opacities have `values`.
-fn piece(
-    frame: &Frame,
-    voxels: &[f32],
-    at: impl Fn(f64) -> [f64; 3],
-    [from, to]: [f64; 2],
-    values: [f32; 2],
-) -> Segment {
-    let found = segment(frame.transfer, values[0], values[1], (to - from) / frame.reference_mm);
-    let Some(parts) = &frame.parts else { return found };
-    let place = at(from + found.centre * (to - from));
-    Segment { colour: found.alpha * colour_at(&frame.grid, parts, voxels, frame.transfer, place), ..found }
+/// A segment between two depths with these values.
+fn piece(frame: &Frame, [from, to]: [f64; 2], values: [f32; 2]) -> Segment {
+    segment(frame.transfer, values[0], values[1], (to - from) / frame.reference_mm)
 }
 
 /// Two segments one behind the other as one, the first of which has a share of the length.
