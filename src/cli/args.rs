@@ -380,8 +380,9 @@ mod tests {
     fn help_reads_the_list_of_methods() {
         let text = methods_help();
         assert!(METHODS.iter().all(|e| text.contains(&format!("{}: {}", e.name, e.what))), "{text}");
-        assert!(rays_help().ends_with("; lao, cao: 26; rays: spiral:50]"), "{}", rays_help());
-        let rules = "lao, cao: left, cell, segment; rays: hybrid, nearest, linear]";
+        let rays = "cones: 26w; lao, cao: 26]";
+        assert!(rays_help().ends_with(rays), "{}", rays_help());
+        let rules = "spao: product; cones: cone; lao, cao: left, cell, segment]";
         assert!(quadrature_help().ends_with(rules), "{}", quadrature_help());
     }
 }

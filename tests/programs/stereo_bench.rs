@@ -376,7 +376,11 @@ fn what_cannot_be_measured_is_refused_before_a_device_is_asked_for() {
     folder.put("cube.nrrd", nrrd("uchar", "2 2 2", "1 1 1", &[0, 50, 100, 150, 200, 250, 20, 30]));
     for (arguments, code, words) in [
         ("--views 3", 2, "expected 1, 2 or 4"),
-        ("--methods lao,vray", 2, "expected one of solid, spao, cones, lao, cao, cao-literal, rays"),
+        (
+            "--methods lao,vray",
+            2,
+            "expected one of solid, sat, shells, vicinity, histograms, fdao, spao, cones, lao, cao, cao-literal, rays",
+        ),
         ("--methods lao,lao", 2, "lao is given twice"),
         ("--scale colour", 2, "expected one of size, rays, radius, resolution, views"),
         ("--scale rays,rays", 2, "rays is given twice"),

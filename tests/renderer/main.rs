@@ -12,6 +12,7 @@ mod embed;
 mod exactness;
 mod external;
 mod failures;
+mod fdao;
 mod fit;
 mod frames;
 mod guest;

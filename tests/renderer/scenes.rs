@@ -94,6 +94,10 @@ impl Scene {
             2 | 3 => {
                 let smallest = self.volume.min_spacing() as f32;
                 let next = &mut self.setup;
+                if next.method.entry().options.contains(&"combine") && random.below(2) == 0 {
+                    let rule = ["own", "neighbours", "max", "sample"][pick(random, 4)];
+                    next.options.set("combine", rule).unwrap();
+                }
                 match random.below(5) {
                     0 => {
                         let radius = [0.0, random.between(0.0, 18.0), random.between(18.0, 60.0)];
@@ -147,6 +151,7 @@ impl Scene {
                 let other = Setup {
                     method,
                     occlusion: Occlusion { rays, quadrature, ..self.setup.occlusion },
+                    options: Options::DEFAULT,
                     ..self.setup
                 };
                 renderer.set_setup(other).unwrap();

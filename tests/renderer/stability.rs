@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, motion, noise, numbers,
-    pixels, radius, sheets, shells, stereo, tables, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, motion, noise,
+    numbers, pixels, radius, sheets, shells, stereo, tables, views,
 };
 use cao_testing::{close, open};
 
@@ -135,6 +135,37 @@ fn inner_layers_grow_dark_with_the_radius() {
     // Where the radius is small, inner layers are as light as the rind: the trial can tell.
     let near = radius::run(&radius::Plan { radii: vec![4.0, 6.0], ..plan }, &mut |_| ()).unwrap();
     assert_eq!(near.ours, Ours::Holds, "{}", near.sentence);
+}
+
+/// Each layer keeps its own light with features, and loses a part of it to the others without.
+#[test]
+fn layers_keep_their_own_light_with_features() {
+    let plan = layers::Plan { edge: 64, voxels: 30, opacity: 0.12, radii: vec![8.0, 24.0] };
+    let finding = layers::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    for name in ["pith", "core"] {
+        assert!(curve(&finding, 0, name).at(24.0) < 0.85, "{}", finding.sentence);
+    }
+    // Where nothing is in the way there is nothing to keep.
+    let faint = layers::run(&layers::Plan { opacity: 1e-4, ..plan }, &mut |_| ()).unwrap();
+    assert!(!faint.control_fails, "{}", faint.sentence);
+}
+
+/// The other way in which ours is limited: it is as good as its labels.
+#[test]
+fn labels_that_are_off_move_the_shading_and_own_values_flip_at_borders() {
+    let gpu = open();
+    let plan = labels::Plan { edge: 24, shifts: vec![0, 1, 3], radius: 5.0 };
+    let finding = labels::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert!(finding.control_fails && finding.ours == Ours::Limited, "{}", finding.sentence);
+    for rule in ["fdAO, own", "fdAO, neighbours", "fdAO, max"] {
+        let error = curve(&finding, 0, rule);
+        assert!(error.at(0.0) == 0.0 && error.at(3.0) > error.at(1.0), "{error:?}");
+    }
+    // Labels that are right are not limited.
+    let right = labels::run(&gpu, &labels::Plan { shifts: vec![0], ..plan }, &mut |_| ()).unwrap();
+    assert_eq!(right.ours, Ours::Holds);
+    close(gpu);
 }
 
 #[test]

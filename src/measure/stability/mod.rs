@@ -10,6 +10,8 @@ pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
+pub mod labels;
+pub mod layers;
 pub mod motion;
 pub mod noise;
 pub mod numbers;
@@ -182,7 +184,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 15] = [
+pub const TRIALS: [Trial; 17] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -217,6 +219,16 @@ pub const TRIALS: [Trial; 15] = [
         name: "radius",
         title: "How dark do inner layers become as the radius grows?",
         run: |_, effort, progress| radius::run(&radius::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "layers",
+        title: "Does each layer's shading depend on the layers around it?",
+        run: |_, effort, progress| layers::run(&layers::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "labels",
+        title: "What does a segmentation that is off do to feature-driven occlusion?",
+        run: |gpu, effort, progress| labels::run(gpu, &labels::Plan::of(effort), progress),
     },
     Trial {
         name: "sheets",

@@ -1,8 +1,8 @@
 //! Radius (measure.md §4): how dark LAO makes layers that lie inside others, as its radius grows.
 //!
 //! Nested translucent shells, each to be seen through the ones around it: a large radius gives the outer ones their shape, and
-//! buries the inner ones, whose rays all end in a shell. Feature-driven ambient occlusion (fdAO) is the answer to this; it does not exist here
-//! yet, so the trial shows where ours, being LAO, stops being of use.
+//! buries the inner ones, whose rays all end in a shell. The trial shows where ours, being LAO, stops being of use; feature-driven ambient
+//! occlusion is the answer to this, and has a trial of its own, [`super::layers`].
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series};
 use crate::Result;
@@ -40,7 +40,7 @@ impl Plan {
 }
 
 /// The fruit's layers from outside in: name, and range of the distance from the centre (half-edge 1, z stretched).
-const LAYERS: [(&str, f64, f64); 4] =
+pub(super) const LAYERS: [(&str, f64, f64); 4] =
     [("rind", 0.87, 0.91), ("pith", 0.79, 0.85), ("flesh", 0.45, 0.7), ("core", 0.265, 0.295)];
 
 /// Opacity of the rind, and of everything inside it: enough to be seen, and to see through.
@@ -49,29 +49,32 @@ const OPACITY: f32 = 0.12;
 /// An inner layer whose ambient factor is below this share of the rind's has lost what sets it off: it reads as shadow.
 pub const BURIED: f64 = 0.5;
 
+/// So many voxels of each layer of a cubic fruit, of those that show.
+pub(super) fn members(grid: &Grid, voxels: usize, shows: impl Fn(usize) -> bool) -> Vec<Vec<[usize; 3]>> {
+    let mut random = Random::new(1);
+    let half = grid.dims[0] as f64 / 2.0;
+    let of_layer = |&(_, low, high): &(&str, f64, f64)| {
+        let mut found = Vec::new();
+        for _ in 0..100_000 {
+            let voxel = grid.voxel(random.below(grid.len() as u64) as usize);
+            let [x, y, z] = voxel.map(|c| (c as f64 + 0.5 - half) / half);
+            let r = (x * x + y * y + (z / 0.92) * (z / 0.92)).sqrt();
+            if found.len() < voxels && (low..high).contains(&r) && shows(grid.index(voxel)) {
+                found.push(voxel);
+            }
+        }
+        found
+    };
+    LAYERS.iter().map(of_layer).collect()
+}
+
 /// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let volume = builtin_box("fruit", [plan.edge; 3], [1.0; 3])?;
     let grid = Grid { dims: volume.dims, spacing: volume.spacing };
     let opacity: Vec<f32> =
         (0..grid.len()).map(|i| if volume.value(i) > 20.0 { OPACITY } else { 0.0 }).collect();
-    let mut random = Random::new(1);
-    let half = plan.edge as f64 / 2.0;
-    let members: Vec<Vec<[usize; 3]>> = LAYERS
-        .iter()
-        .map(|&(_, low, high)| {
-            let mut found = Vec::new();
-            for _ in 0..100_000 {
-                let voxel = grid.voxel(random.below(grid.len() as u64) as usize);
-                let [x, y, z] = voxel.map(|c| (c as f64 + 0.5 - half) / half);
-                let r = (x * x + y * y + (z / 0.92) * (z / 0.92)).sqrt();
-                if found.len() < plan.voxels && (low..high).contains(&r) && opacity[grid.index(voxel)] > 0.0 {
-                    found.push(voxel);
-                }
-            }
-            found
-        })
-        .collect();
+    let members = members(&grid, plan.voxels, |i| opacity[i] > 0.0);
     let mut curves = vec![Vec::new(); LAYERS.len()];
     // How far a layer's mean by brick is from that by the sampler, at most, along the same rays.
     let mut off = [Quadrature::Nearest, Quadrature::Hybrid].map(|rule| (rule, 0.0_f64));
@@ -119,7 +122,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
         sentence: format!(
             "LAO, ours included, darkens inner layers as its radius grows: the {} from {} at {} voxels to {} at {}, which is {} of the rind's \
              and {from} (at {} voxels the darkest has {}); the means of rays by brick are within {} of these with the nearest voxel and {} with the rule hybrid; \
-             feature-driven occlusion, which is to keep them light, does not exist here yet.",
+             feature-driven occlusion keeps them light (trial layers).",
             LAYERS[last.1].0,
             short(inner.points[0][1]),
             radius(0),
