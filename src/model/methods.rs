@@ -189,6 +189,11 @@ impl Method {
         (self.rays() == RaySet::None) == (rays == RaySet::None)
     }
 
+    /// These rays where it follows such, else its own.
+    pub fn rays_like(self, rays: RaySet) -> RaySet {
+        if self.follows(rays) { rays } else { self.rays() }
+    }
+
     /// The options that charts and the planner try.
     pub fn variants(self) -> impl Iterator<Item = Options> {
         let listed = self.entry().variants.iter();

@@ -28,7 +28,7 @@ use glam::Vec3;
 fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet, method: Method) -> Renderer {
     let setup = Setup {
         occlusion: Occlusion {
-            rays,
+            rays: method.rays_like(rays),
             quadrature: method.quadrature(),
             radius_mm: 5.0 * volume.min_spacing() as f32,
             offset_mm: None,

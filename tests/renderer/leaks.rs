@@ -23,7 +23,7 @@ use std::sync::Arc;
 fn renderer(gpu: &Gpu, volume: &Volume, method: Method) -> Renderer {
     let setup = Setup {
         occlusion: Occlusion {
-            rays: RaySet::R6,
+            rays: method.rays_like(RaySet::R6),
             quadrature: method.quadrature(),
             radius_mm: 3.0,
             offset_mm: None,

@@ -20,7 +20,7 @@ pub const NAMES: [&str; 3] = ["engine", "fruit", "skeleton"];
 const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, literal: false };
 
 fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
-    let quadrature = method.quadrature();
+    let (rays, quadrature) = (method.rays_like(rays), method.quadrature());
     Setup {
         occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
         method,
@@ -95,7 +95,7 @@ impl Scene {
                     }
                     1 => {
                         let sets = [RaySet::R6, RaySet::W14, RaySet::W26, RaySet::Spiral(20)];
-                        next.occlusion.rays = sets[pick(random, 4)];
+                        next.occlusion.rays = next.method.rays_like(sets[pick(random, 4)]);
                         let rules = next.method.entry().quadratures;
                         next.occlusion.quadrature = rules[pick(random, rules.len())];
                     }
@@ -137,10 +137,10 @@ impl Scene {
             6 if random.below(4) == 0 => {
                 let others: Vec<_> = methods().filter(|method| *method != self.setup.method).collect();
                 let method = others[pick(random, others.len())];
-                let quadrature = method.quadrature();
+                let (rays, quadrature) = (method.rays_like(self.setup.occlusion.rays), method.quadrature());
                 let other = Setup {
                     method,
-                    occlusion: Occlusion { quadrature, ..self.setup.occlusion },
+                    occlusion: Occlusion { rays, quadrature, ..self.setup.occlusion },
                     ..self.setup
                 };
                 renderer.set_setup(other).unwrap();

@@ -62,9 +62,7 @@ impl Way {
         if !setup.method.has(setup.occlusion.quadrature) {
             setup.occlusion.quadrature = setup.method.quadrature();
         }
-        if !setup.method.follows(setup.occlusion.rays) {
-            setup.occlusion.rays = setup.method.rays();
-        }
+        setup.occlusion.rays = setup.method.rays_like(setup.occlusion.rays);
         setup
     }
 

@@ -8,9 +8,12 @@ use super::{Change, Chart, Point, SceneChart};
 use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
 use cao_model::occlusion::Quadrature;
 
-/// Colours that stay apart for the colour-blind (Okabe and Ito 2008, their yellow darker, on white), in the order of the methods after "solid colour".
-const COLOURS: [&str; 8] =
-    ["#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#56b4e9", "#b8a800", "#009e73"];
+/// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
+/// Further ones are between them, or darker.
+const COLOURS: [&str; 12] = [
+    "#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73", "#56b4e9", "#8f6f1b", "#7a3b8f",
+    "#a3c130", "#7b1e1e", "#2f4f8f",
+];
 pub(super) const GREY: &str = "#777777";
 pub(super) const FRONT: &str = "#aaaaaa";
 
@@ -24,8 +27,20 @@ const LEFT: f64 = 70.0;
 const TOP: f64 = 66.0;
 const BETWEEN: [f64; 2] = [84.0, 86.0];
 const WIDTH: f64 = LEFT + 2.0 * FRAME[0] + BETWEEN[0] + 24.0;
-/// Height of the legend's three rows.
-const LEGEND: f64 = 64.0;
+/// Height of one of the legend's rows, and what is below the last.
+const ROW: f64 = 20.0;
+const BELOW: f64 = 4.0;
+
+/// Rules that have a shape of their own: those along rays.
+const RULES: [Quadrature; 7] = [
+    Quadrature::Left,
+    Quadrature::Cell,
+    Quadrature::Segment,
+    Quadrature::Hybrid,
+    Quadrature::Nearest,
+    Quadrature::Linear,
+    Quadrature::Cone,
+];
 
 /// One contender in one panel.
 #[derive(Clone, Debug)]
@@ -82,7 +97,8 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     let ratios = chart.software;
     let legend_top = TOP + 2.0 * FRAME[1] + BETWEEN[1] + 62.0;
     let methods = methods(scenes);
-    let height = legend_top + LEGEND + 15.0 * caption.len() as f64 + 10.0;
+    let caption_top = legend_top + legend_height(&methods);
+    let height = caption_top + 15.0 * caption.len() as f64 + 10.0;
     let mut drawing = Drawing::new(WIDTH, height);
     let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
     let title = |of: &str| format!("Ambient occlusion after a change: time against error. {of}");
@@ -106,7 +122,7 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     }
     legend(&mut drawing, legend_top, &methods);
     for (n, line) in caption.iter().enumerate() {
-        let y = legend_top + LEGEND + 15.0 * n as f64;
+        let y = caption_top + 15.0 * n as f64;
         drawing.text([LEFT, y], line, 11, Anchor::Start, GREY, false);
     }
     drawing
@@ -141,13 +157,14 @@ fn shape(quadrature: Option<Quadrature>) -> Marker {
         Some(Quadrature::Hybrid) => Marker::Right,
         Some(Quadrature::Linear) => Marker::Left,
         Some(Quadrature::Cone) => Marker::Hexagon,
-        Some(Quadrature::Product) | None => Marker::Diamond,
+        // Without rays.
+        _ => Marker::Diamond,
     }
 }
 
 /// Equal weights, as in the paper.
 fn hollow(point: &Point) -> bool {
-    shape(point.setting.quadrature) != shape(None) && !point.setting.label.contains('w')
+    point.setting.quadrature.is_some() && !point.setting.label.contains('w')
 }
 
 fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) {
@@ -231,45 +248,58 @@ pub(super) fn label(
     }
 }
 
-/// Rules that have a mark of their own.
-fn rules_of_rays() -> impl Iterator<Item = Quadrature> {
-    Quadrature::ALL.into_iter().filter(|rule| shape(Some(*rule)) != shape(None))
+/// An entry of the legend: text, colour, its mark or none for a line, hollow.
+type Entry = (String, &'static str, Option<Marker>, bool);
+
+/// Entries of the legend, rows that begin anew; each goes on in the next one where the sheet ends.
+fn entries(methods: &[&str]) -> [Vec<Entry>; 3] {
+    let of = |method: &&str| ((*method).to_owned(), colour(methods, method), None, false);
+    let rule = |rule: Quadrature| (format!("{} rule", rule.name()), INK, Some(shape(Some(rule))), false);
+    let others = [
+        ("equal weights", INK, Some(Marker::Circle), true),
+        ("weighted rays", INK, Some(Marker::Circle), false),
+        ("no rays", INK, Some(Marker::Diamond), false),
+        ("Pareto front; numbers are rays", FRONT, None, false),
+    ];
+    [
+        methods.iter().map(of).collect(),
+        RULES.map(rule).into(),
+        others.map(|(text, colour, marker, hollow)| (text.to_owned(), colour, marker, hollow)).into(),
+    ]
+}
+
+/// Where each entry stands: left edge and row.
+fn places(entries: &[Vec<Entry>; 3]) -> Vec<(f64, usize, &Entry)> {
+    let (mut placed, mut row) = (Vec::new(), 0);
+    for of_row in entries {
+        let mut x = LEFT;
+        for entry in of_row {
+            let width = 22.0 + text_width(&entry.0, 12) + 16.0;
+            if x > LEFT && x + width > WIDTH {
+                (x, row) = (LEFT, row + 1);
+            }
+            placed.push((x, row, entry));
+            x += width;
+        }
+        row += 1;
+    }
+    placed
+}
+
+fn legend_height(methods: &[&str]) -> f64 {
+    let rows = places(&entries(methods)).last().map_or(0, |(_, row, _)| row + 1);
+    ROW * rows as f64 + BELOW
 }
 
 fn legend(drawing: &mut Drawing, top: f64, methods: &[&str]) {
-    let mut x = LEFT;
-    let mut entry = |drawing: &mut Drawing, text: &str, mark: &mut dyn FnMut(&mut Drawing, f64)| {
-        mark(drawing, x + 8.0);
-        drawing.text([x + 22.0, top + 4.0], text, 12, Anchor::Start, INK, false);
-        x += 22.0 + text_width(text, 12) + 16.0;
-    };
-    for method in methods {
-        let colour = colour(methods, method);
-        entry(drawing, method, &mut |drawing, x| {
-            drawing.line([x - 8.0, top], [x + 8.0, top], colour, 5.0, colour == GREY);
-        });
-    }
-    // Each row: text, its mark or none for the line of the front, hollow.
-    type Entry = (String, Option<Marker>, bool);
-    let rules: Vec<Entry> = rules_of_rays()
-        .map(|rule| (format!("{} rule", rule.name()), Some(shape(Some(rule))), false))
-        .collect();
-    let others: [Entry; 4] = [
-        ("equal weights".into(), Some(Marker::Circle), true),
-        ("weighted rays".into(), Some(Marker::Circle), false),
-        ("no rays".into(), Some(Marker::Diamond), false),
-        ("Pareto front; numbers are rays".into(), None, false),
-    ];
-    for (row, entries) in [&rules[..], &others[..]].into_iter().enumerate() {
-        let (mut x, y) = (LEFT, top + 20.0 * (1 + row) as f64);
-        for (text, marker, hollow) in entries {
-            match marker {
-                Some(marker) => drawing.marker(*marker, [x + 8.0, y], RADIUS, INK, *hollow),
-                None => drawing.line([x, y], [x + 16.0, y], FRONT, 2.0, false),
-            }
-            drawing.text([x + 22.0, y + 4.0], text, 12, Anchor::Start, INK, false);
-            x += 22.0 + text_width(text, 12) + 16.0;
+    for (x, row, (text, colour, marker, hollow)) in places(&entries(methods)) {
+        let y = top + ROW * row as f64;
+        match marker {
+            Some(marker) => drawing.marker(*marker, [x + 8.0, y], RADIUS, colour, *hollow),
+            None if *colour == FRONT => drawing.line([x, y], [x + 16.0, y], FRONT, 2.0, false),
+            None => drawing.line([x, y], [x + 16.0, y], colour, 5.0, *colour == GREY),
         }
+        drawing.text([x + 22.0, y + 4.0], text, 12, Anchor::Start, INK, false);
     }
 }
 
@@ -284,22 +314,18 @@ mod tests {
 
     #[test]
     fn the_legend_stays_on_the_sheet_and_above_the_caption() {
-        let mut drawing = Drawing::new(WIDTH, LEGEND);
-        let methods = [
-            "solid colour",
-            "image space",
-            "LAO (unit)",
-            "LAO",
-            "CAO literal",
-            "CAO",
-            "SPAO",
-            "cones",
-            "rays",
-        ];
+        let methods: Vec<&str> = ["solid colour", "image space", "LAO (unit)", "CAO literal", "CAO", "rays"]
+            .into_iter()
+            .chain(cao_model::METHODS.iter().map(|entry| entry.name))
+            .collect();
+        let height = legend_height(&methods);
+        // As one row each they would leave it.
+        assert!(height > 3.0 * ROW + BELOW);
+        let mut drawing = Drawing::new(WIDTH, height);
         legend(&mut drawing, 0.0, &methods);
         let svg = drawing.svg();
         let texts: Vec<_> = svg.split("<text ").skip(1).collect();
-        assert_eq!(texts.len(), methods.len() + rules_of_rays().count() + 4);
+        assert_eq!(texts.len(), methods.len() + RULES.len() + 4);
         for text in texts {
             let of = |name: &str| -> f64 {
                 let from = text.split(&format!("{name}=\"")).nth(1).unwrap();
@@ -307,7 +333,7 @@ mod tests {
             };
             let words = text.split(['>', '<']).nth(1).unwrap();
             assert!(of("x") + text_width(words, 12) <= WIDTH, "{words} leaves the sheet");
-            assert!(of("y") + 12.0 <= LEGEND, "{words} is in the caption");
+            assert!(of("y") + 12.0 <= height, "{words} is in the caption");
         }
     }
 }
