@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, motion, noise,
-    numbers, pixels, radius, sheets, shells, stereo, tables, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, motion,
+    noise, numbers, pixels, radius, sheets, shells, stereo, tables, views,
 };
 use cao_testing::{close, open};
 

@@ -31,6 +31,17 @@ const WIDTH: f64 = LEFT + 2.0 * FRAME[0] + BETWEEN[0] + 24.0;
 const ROW: f64 = 20.0;
 const BELOW: f64 = 4.0;
 
+/// Rules that have a shape of their own: those along rays.
+const RULES: [Quadrature; 7] = [
+    Quadrature::Left,
+    Quadrature::Cell,
+    Quadrature::Segment,
+    Quadrature::Hybrid,
+    Quadrature::Nearest,
+    Quadrature::Linear,
+    Quadrature::Cone,
+];
+
 /// One contender in one panel.
 #[derive(Clone, Debug)]
 pub struct Mark {
@@ -153,7 +164,7 @@ fn shape(quadrature: Option<Quadrature>) -> Marker {
 
 /// Equal weights, as in the paper.
 fn hollow(point: &Point) -> bool {
-    shape(point.setting.quadrature) != shape(None) && !point.setting.label.contains('w')
+    point.setting.quadrature.is_some() && !point.setting.label.contains('w')
 }
 
 fn fill(drawing: &mut Drawing, panel: &Panel, marks: &[Mark], methods: &[&str]) {
@@ -237,11 +248,6 @@ pub(super) fn label(
     }
 }
 
-/// Rules that have a mark of their own.
-fn rules_of_rays() -> impl Iterator<Item = Quadrature> {
-    Quadrature::ALL.into_iter().filter(|rule| shape(Some(*rule)) != shape(None))
-}
-
 /// An entry of the legend: text, colour, its mark or none for a line, hollow.
 type Entry = (String, &'static str, Option<Marker>, bool);
 
@@ -257,7 +263,7 @@ fn entries(methods: &[&str]) -> [Vec<Entry>; 3] {
     ];
     [
         methods.iter().map(of).collect(),
-        rules_of_rays().map(rule).collect(),
+        RULES.map(rule).into(),
         others.map(|(text, colour, marker, hollow)| (text.to_owned(), colour, marker, hollow)).into(),
     ]
 }
@@ -319,7 +325,7 @@ mod tests {
         legend(&mut drawing, 0.0, &methods);
         let svg = drawing.svg();
         let texts: Vec<_> = svg.split("<text ").skip(1).collect();
-        assert_eq!(texts.len(), methods.len() + rules_of_rays().count() + 4);
+        assert_eq!(texts.len(), methods.len() + RULES.len() + 4);
         for text in texts {
             let of = |name: &str| -> f64 {
                 let from = text.split(&format!("{name}=\"")).nth(1).unwrap();

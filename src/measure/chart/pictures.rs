@@ -51,7 +51,7 @@ pub(super) fn featured<'a>(
             .find(|s| s.name() == ours)
             .or_else(|| own.iter().find(|s| s.label == "26w" && s.quadrature == Some(Quadrature::Segment)))
             .or_else(|| own.iter().find(|s| s.label == "26"))
-            .or_else(|| own.iter().find(|s| s.quadrature.is_some()))
+            .or_else(|| own.iter().find(|s| s.quadrature.is_some() || Quadrature::parse(&s.label).is_ok()))
             .unwrap_or(&own[own.len() / 2]);
         chosen.push((entry.method, (*best).clone()));
     }

@@ -4,8 +4,8 @@
 //! It has values at what the eyes see only: its errors are at points of the surface in the left eye's image. It shades half
 //! a sphere where the others shade all of it; twice their ambient factor is what it stands for, and so its values are halved.
 
-use super::rendered::{HALF_SPHERE, change_to, with_radius};
-use super::{Arena, Asked, Change, Contender, Entrant, Setting, State, Values, surface_look};
+use super::rendered::{change_to, with_radius};
+use super::{Arena, Asked, Change, Contender, Entrant, HALF_SPHERE, Setting, State, Values, surface_look};
 use crate::Result;
 use crate::kernels::ssao::Ssao;
 use cao::renderer::{COLOUR, Renderer, StereoImage, Target, Targets};

@@ -1,6 +1,6 @@
 //! Contenders that are methods of [`cao_model::METHODS`], each with the ray sets and rules of its entry.
 
-use super::{Asked, Entrant, Setting, rendered};
+use super::{Asked, Entrant, HALF_SPHERE, Setting, rendered};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::Options;
@@ -45,26 +45,22 @@ impl Listed {
 
     fn entrant(&self, name: &'static str, setup: Setup, asked: &Asked) -> Entrant {
         let occlusion = &setup.occlusion;
-        let mut setting = Setting::rays(occlusion, asked.min_spacing, self.computes);
-        let given = setup.options.other_than(&Options::DEFAULT);
-        let mut options: Vec<String> =
-            given.iter().map(|(option, value)| format!("{option} {value}")).collect();
-        if occlusion.rays == RaySet::None {
-            // The method's first option says what it is, its own value too.
-            let entry = self.method.entry();
-            if let (true, Some(first)) = (given.is_empty(), entry.options.first()) {
-                options.extend(setup.options.value(first).map(|value| format!("{first} {value}")));
-            }
-            setting.details = self.computes.to_owned();
-        } else {
-            options.insert(0, occlusion.rays.name());
-        }
-        setting.label = options.join(" ");
+        let mut setting = match occlusion.rays {
+            RaySet::None => Setting {
+                label: occlusion.quadrature.name().into(),
+                quadrature: None,
+                details: self.computes.into(),
+            },
+            _ => Setting::rays(occlusion, asked.min_spacing, self.computes),
+        };
         let half_sphere = (self.half_sphere)(&setup.options);
         if half_sphere {
             setting.details += ", halved";
         }
+        for (option, value) in setup.options.other_than(&Options::DEFAULT) {
+            setting.label += &format!(" {option} {value}");
+        }
         let work = self.ray * occlusion.rays.count().max(1) as f64;
-        rendered::entrant(name, setup, setting, work, half_sphere)
+        rendered::entrant(name, setup, setting, work, if half_sphere { HALF_SPHERE } else { 1.0 })
     }
 }

@@ -156,6 +156,9 @@ impl Kind {
     }
 }
 
+/// What methods that shade half a sphere count in data space, where all of it is shaded: a flat wall has 1 in the ones, 1/2 in the others.
+const HALF_SPHERE: f32 = 0.5;
+
 /// Name of no ambient occlusion, the paper's "solid colour" (CAO §4).
 pub const SOLID: &str = "solid colour";
 

@@ -41,7 +41,7 @@ fn entrants(
         let setting = Setting::rays(&occlusion, asked.min_spacing, computes);
         let setup = Setup { occlusion, scope: Scope::All, ..setup };
         // The literal maps, too, have all of it recomputed, or nearly.
-        rendered::entrant(name, setup, setting, rays.count() as f64, false)
+        rendered::entrant(name, setup, setting, rays.count() as f64, 1.0)
     };
     sets.iter().map(entrant).collect()
 }

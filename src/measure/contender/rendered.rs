@@ -8,17 +8,13 @@ use cao_gpu::Timings;
 use cao_model::look::Look;
 use cao_model::settings::Setup;
 
-/// What values over half a sphere are of data-space ones: a flat wall has 1 by them and ½ by all the sphere.
-pub const HALF_SPHERE: f32 = 0.5;
-
-/// One whose renderer has this setup, and values over all the sphere or half of it.
-pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64, half_sphere: bool) -> Entrant {
-    let share = if half_sphere { HALF_SPHERE } else { 1.0 };
+/// One whose renderer has this setup, and whose values count so much.
+pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64, counts: f32) -> Entrant {
     Entrant {
         method: name,
         setting,
         work,
-        open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, share, state)?))),
+        open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, counts, state)?))),
     }
 }
 
@@ -26,18 +22,17 @@ struct Rendered<'a> {
     arena: Arena<'a>,
     renderer: Renderer,
     setup: Setup,
-    /// Of its values, what they are in data space.
-    share: f32,
+    counts: f32,
 }
 
 impl<'a> Rendered<'a> {
-    fn open(arena: Arena<'a>, setup: Setup, share: f32, state: &State) -> Result<Self> {
+    fn open(arena: Arena<'a>, setup: Setup, counts: f32, state: &State) -> Result<Self> {
         let setup = with_radius(setup, state.radius_mm);
         let (transfer, volume) = (state.transfer.clone(), arena.volume);
         let mut renderer = Renderer::new(arena.gpu, volume, transfer, setup, COLOUR)?;
         renderer.set_clips(&state.clips)?;
         renderer.update(&mut |_| ())?;
-        Ok(Self { arena, renderer, setup, share })
+        Ok(Self { arena, renderer, setup, counts })
     }
 }
 
@@ -70,12 +65,15 @@ impl Contender for Rendered<'_> {
     }
 
     fn ambient(&self) -> Result<Values> {
-        let values = self.renderer.read_ambient()?;
-        Ok(Values::Voxels(values.into_iter().map(|value| self.share * value).collect()))
+        let mut values = self.renderer.read_ambient()?;
+        if self.counts != 1.0 {
+            values.iter_mut().for_each(|value| *value *= self.counts);
+        }
+        Ok(Values::Voxels(values))
     }
 
     fn draw(&self, look: &Look) -> Result<(StereoImage, Timings)> {
-        let look = Look { gain: self.share * look.gain, ..*look };
+        let look = Look { gain: look.gain * self.counts, ..*look };
         Ok(self.renderer.draw(self.arena.views, &look, self.arena.size)?)
     }
 }
