@@ -16,7 +16,7 @@ use cao_model::clip::{Clip, ClipCamera, Mode, Pose, Shape};
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::{MapSettings, Setup};
+use cao_model::settings::{AntiAliasing, MapSettings, Setup, Support};
 use cao_model::transfer::TransferFunction;
 use cao_twin::cast::lao::lao_at;
 use cao_twin::clip::classify::sample_positions;
@@ -48,6 +48,9 @@ impl Plan {
 
 /// Radius in voxels.
 const RADIUS: f32 = 5.0;
+
+/// Where the clip samples of ours and of eq. (4) as printed lie.
+const SUPPORT: Support = Support::Voxel;
 
 /// Cells along an edge of the device's own dilation maps.
 const DEVICE_CELLS: u32 = 128;
@@ -190,7 +193,7 @@ impl Scene {
         let (radius, margin) = match literal {
             true => (reach, reach),
             false => {
-                let radius = changed_radius(grid, reach);
+                let radius = changed_radius(grid, reach, SUPPORT);
                 let size = std::array::from_fn(|axis| grid.dims[axis] as f64 * grid.spacing[axis]);
                 let half = 0.5 * Vec3::from_array(size.map(|c: f64| c as f32)).length();
                 (radius + clip.rounding_mm(half, radius), 0.0)
@@ -199,11 +202,11 @@ impl Scene {
         let camera = ClipCamera::around(mesh, clip.pose.scale, margin, resolution);
         let layers = as_twin(&peel.run(gpu, mesh, clip.pose.scale, camera, 4)?);
 
-        let positions = sample_positions(32);
+        let positions = sample_positions(AntiAliasing::N32);
         let to_rigid = clip.pose.rotation().transpose();
         // The n-th sample of a voxel in the mesh's rigid frame, as `Pose::to_rigid` has it.
         let sample = |voxel: [usize; 3], n: usize| {
-            let index = std::array::from_fn(|axis| voxel[axis] as f64 + 0.5 * positions[n][axis]);
+            let index = std::array::from_fn(|axis| voxel[axis] as f64 + positions[n][axis]);
             let world = Vec3::from_array(grid.to_world(index).map(|c| c as f32));
             to_rigid * (world - clip.pose.translate_mm)
         };
@@ -220,7 +223,7 @@ impl Scene {
             .collect();
         // Farther from the hidden region no footprint reaches it.
         let bound = mesh.bounds().0.abs().max(mesh.bounds().1.abs()).length() * clip.pose.scale.max_element();
-        let far = bound + changed_radius(grid, reach);
+        let far = bound + changed_radius(grid, reach, SUPPORT);
         let found: Vec<Option<usize>> = each(grid.len(), |i| {
             let voxel = grid.voxel(i);
             let near = sample(voxel, 0).length() <= far;

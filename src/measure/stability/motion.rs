@@ -2,7 +2,9 @@
 //! how long it takes to settle when the clip stops.
 //!
 //! A plane along the voxels' own axes, the hardest case: all voxels of the cut change in the same frame. The finest steps are computed,
-//! coarser ones are frames left out. Control of the jumps: N = 0, no anti-aliasing samples (CAO eq. (5)). Control of settling:
+//! coarser ones are frames left out. Control of the jumps: N = 0, no anti-aliasing samples (CAO eq. (5)). Beside it N = 8, and with N = 32 both
+//! estimators and both supports (method.md §6); what share of one voxel each of them leaves to such a plane is in a chart of its own,
+//! by the twin. Control of settling:
 //! progressive LAO, which recomputes one part of the slices a frame and shows the rest as it was.
 
 use super::plane_cut::PlaneCut;
@@ -10,11 +12,13 @@ use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
 use crate::Result;
 use crate::plot::short;
 use cao_gpu::Gpu;
+use cao_model::clip::{Clip, Shape};
 use cao_model::look::Look;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-use cao_model::settings::AntiAliasing;
-use cao_model::settings::Setup;
-use cao_twin::trilinear_clamped;
+use cao_model::settings::{AntiAliasing, Estimator, Setup, Support};
+use cao_twin::clip::classify::classify;
+use cao_twin::clip::clips::{ClipField, Dilation, Maps};
+use cao_twin::{Grid, trilinear_clamped};
 use glam::Vec3;
 
 /// Sizes and values of the trial.
@@ -50,13 +54,33 @@ const PARTS: usize = 8;
 const MOVES: usize = 6;
 const RESTS: usize = 12;
 
+/// Ways to sample a cut voxel: the control, the default, then what is measured beside it.
+const WAYS: [(&str, AntiAliasing); 6] = [
+    ("N = 0", AntiAliasing::N0),
+    ("N = 32 (ours)", AntiAliasing::N32),
+    ("N = 8", AntiAliasing::N8),
+    ("eq. (5) as printed", AntiAliasing { estimator: Estimator::Paper, ..AntiAliasing::N32 }),
+    ("the 32 alone, to a voxel out", wide(Estimator::Interior)),
+    ("eq. (5), samples to a voxel out", wide(Estimator::Paper)),
+];
+
+const fn wide(estimator: Estimator) -> AntiAliasing {
+    AntiAliasing { estimator, support: Support::Neighbours, ..AntiAliasing::N32 }
+}
+
+/// Steps of the plane in which a voxel's share is looked at, for one voxel.
+const SHARE_STEPS: usize = 256;
+
+/// Of these one in so many is drawn.
+const DRAWN: usize = 5;
+
 /// A frame has settled when nothing is off by more than this: half a step of an 8-bit display at twice the ambient factor.
 pub const SETTLED: f64 = 0.5 / 255.0 / 2.0;
 
 /// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let frames = plan.frames * plan.way + 1;
-    let total = (3 * frames + MOVES + RESTS) as f64;
+    let total = (WAYS.len() * frames + MOVES + RESTS) as f64;
     let mut done = 0.0;
     let mut tick = || {
         done += 1.0;
@@ -71,28 +95,25 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     };
     let (mut ambient, mut picture) = (Vec::new(), Vec::new());
     let mut stage = PlaneCut::new(gpu, plan.edge, occlusion, plan.way)?;
-    for (samples, name) in [(AntiAliasing::N0, 0), (AntiAliasing::N8, 8), (AntiAliasing::N32, 32)] {
-        {
-            let setup = Setup { anti_aliasing: samples, ..*stage.renderer.setup() };
-            stage.renderer.set_setup(setup)?;
-        };
+    for (n, (name, how)) in WAYS.into_iter().enumerate() {
+        let setup = Setup { anti_aliasing: how, ..*stage.renderer.setup() };
+        stage.renderer.set_setup(setup)?;
         let mut seen = Vec::new();
         for frame in 0..frames {
             seen.push(shown(&mut stage, frame as f64 / plan.frames as f64, plan.pixels)?);
             tick();
         }
         let curve = |of: fn(&Frame) -> &Vec<f64>| jumps(&seen, plan.frames, of);
-        let series = |points| match name {
-            0 => Series::control("N = 0", points),
-            n => Series::ours(format!("N = {n}{}", if n == 32 { " (ours)" } else { "" }), points),
-        };
+        let series = |points| of_way(n, name, points);
         ambient.push(series(curve(|frame| &frame.ambient)));
         picture.push(series(curve(|frame| &frame.light)));
     }
+    stage.renderer.set_setup(Setup { anti_aliasing: AntiAliasing::N32, ..*stage.renderer.setup() })?;
     let settling = settle(&mut stage, &mut tick)?;
+    let shares = WAYS.map(|(_, how)| share_errors(how)).into_iter().collect::<Result<Vec<_>>>()?;
 
     let finest = 1.0 / plan.frames as f64;
-    let ratio = ambient[0].at(finest) / ambient[2].at(finest).max(1e-12);
+    let ratio = ambient[0].at(finest) / ambient[1].at(finest).max(1e-12);
     let holds = settling.ours_frames == 0 && settling.different == 0;
     let says = match holds {
         true => format!(
@@ -106,16 +127,22 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     Ok(Finding {
         sentence: format!(
             "Without anti-aliasing samples the cut face's ambient factor jumps by {} in a step of {} voxel (the picture's light by {}), \
-             {}× as much as with N = 32 ({}; N = 8: {}), though over a whole voxel it changes by {} only; when the clip stops, {says}.",
+             {}× as much as with N = 32 ({}; N = 8: {}; eq. (5) as printed: {}), though over a whole voxel it changes by {} only; the share of a \
+             voxel is off by {} RMS and jumps by {} at most in 1/{SHARE_STEPS} voxel ({} and {} as printed); when the clip stops, {says}.",
             short(ambient[0].at(finest)),
             short(finest),
             short(picture[0].at(finest)),
             short(ratio),
-            short(ambient[2].at(finest)),
             short(ambient[1].at(finest)),
-            short(ambient[2].at(1.0)),
+            short(ambient[2].at(finest)),
+            short(ambient[3].at(finest)),
+            short(ambient[1].at(1.0)),
+            short(shares[1].rms),
+            short(shares[1].jump),
+            short(shares[3].rms),
+            short(shares[3].jump),
         ),
-        ours: Ours::holding(holds && ambient[2].at(finest) < ambient[0].at(finest)),
+        ours: Ours::holding(holds && ambient[1].at(finest) < ambient[0].at(finest)),
         control_fails: ratio > 1.0 && settling.progressive_frames > 0,
         setting: format!(
             "engine {}³ cut by a plane along the voxels, 14 rays, radius {RADIUS} voxels, {}² pixels; largest jump between any two \
@@ -136,6 +163,17 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
                 series: picture,
             },
             Chart {
+                title: "Error of a voxel's visible share".into(),
+                x: Quantity::linear("place of the plane, voxels from the centre"),
+                y: Quantity::linear("share − exact share (0 … 1)"),
+                series: WAYS
+                    .into_iter()
+                    .zip(shares)
+                    .enumerate()
+                    .map(|(n, ((name, _), share))| of_way(n, name, share.points))
+                    .collect(),
+            },
+            Chart {
                 title: format!("Error of the shown ambient volume; the clip stops after frame {}", MOVES - 1),
                 x: Quantity::linear("frame"),
                 y: Quantity::linear("largest |error| of a visible voxel (0 … 1)"),
@@ -143,6 +181,45 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
             },
         ],
     })
+}
+
+/// The curve of the n-th of [`WAYS`].
+fn of_way(n: usize, name: &str, points: Vec<[f64; 2]>) -> Series {
+    match n {
+        0 => Series::control(name, points),
+        1 => Series::ours(name, points),
+        _ => Series::yardstick(name, points),
+    }
+}
+
+/// How a voxel's share follows a plane.
+struct ShareErrors {
+    /// (place, share − exact share), of some places.
+    points: Vec<[f64; 2]>,
+    rms: f64,
+    /// Largest change of the share from one place to the next.
+    jump: f64,
+}
+
+/// A plane along the axes passes a voxel in [`SHARE_STEPS`] steps, between the places of its samples.
+fn share_errors(how: AntiAliasing) -> Result<ShareErrors> {
+    let grid = Grid { dims: [3; 3], spacing: [1.0; 3] };
+    let maps = Maps { layers: 1, resolution: 8, dilation: Dilation::Conservative(8), support: how.support };
+    let mut points = Vec::new();
+    let (mut jump, mut last) = (0.0_f64, None);
+    for n in 0..=SHARE_STEPS {
+        let place = (n as f64 - 0.5 * SHARE_STEPS as f64 + 0.37) / SHARE_STEPS as f64;
+        let mut clip = Clip::remove(Shape::Plane);
+        clip.pose.translate_mm.z = place as f32;
+        let field = ClipField::new(&clip, &grid, 0.0, &maps)?;
+        let (clipped, _) = classify(&grid, &vec![1.0; grid.len()], &[field], how);
+        let share = f64::from(clipped[grid.index([1; 3])]);
+        jump = jump.max(last.map_or(0.0, |last: f64| (share - last).abs()));
+        last = Some(share);
+        points.push([place, share - (0.5 + place).clamp(0.0, 1.0)]);
+    }
+    let rms = mean(&points.iter().map(|point| point[1].powi(2)).collect::<Vec<_>>()).sqrt();
+    Ok(ShareErrors { points: points.into_iter().step_by(DRAWN).collect(), rms, jump })
 }
 
 /// What one frame shows of the cut face.

@@ -14,6 +14,7 @@
 use crate::clip::clips::{MeshLayers, NO_BACK, NO_FRONT, pixel};
 use crate::{Grid, each};
 use cao_model::clip::{ClipCamera, Mode};
+use cao_model::settings::Support;
 use cao_model::{Error, Result};
 use glam::Vec3;
 
@@ -39,10 +40,10 @@ impl DilationMap {
 }
 
 /// Radius in mm around a hidden region within which a voxel's ambient value may change (method.md §5): the reach of
-/// its rays, the voxel diagonal over which a sample interpolates, half a diagonal from a voxel's centre to its
+/// its rays, the voxel diagonal over which a sample interpolates, the way from a voxel's centre to its farthest
 /// clip samples, and a hundredth for rounding, of which the 1/512 voxel of a GPU's texture coordinates is the most.
-pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
-    (f64::from(reach_mm) + (1.5 + 1e-2) * grid.diagonal()) as f32
+pub fn changed_radius(grid: &Grid, reach_mm: f32, support: Support) -> f32 {
+    (f64::from(reach_mm) + (1.0 + f64::from(support.corner()) + 1e-2) * grid.diagonal()) as f32
 }
 
 /// A dilation map of which each cell is computed when it is asked for: of the largest maps the few cells that matter take seconds,
