@@ -7,6 +7,7 @@ use cao_model::glam::Vec3;
 use cao_model::look::Look;
 use cao_model::mesh::TriangleMesh;
 use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_model::settings::{AntiAliasing, Support};
 use cao_model::view::StereoRig;
 use cao_twin as twin;
 use cao_twin::Grid;
@@ -17,7 +18,8 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 const EDGE: usize = 24;
-const MAPS: Maps = Maps { layers: 2, resolution: 64, dilation: Dilation::Conservative(48) };
+const MAPS: Maps =
+    Maps { layers: 2, resolution: 64, dilation: Dilation::Conservative(48), support: Support::Voxel };
 
 fn twins(criterion: &mut Criterion) {
     let name = format!("builtin:engine:{EDGE}");
@@ -36,7 +38,7 @@ fn twins(criterion: &mut Criterion) {
     let field = |clip: &Clip| ClipField::new(clip, &grid, reach, &MAPS).expect("maps");
     let mesh = clip(Shape::Mesh(Arc::new(TriangleMesh::sphere(2))));
     let clips = [field(&clip(Shape::Sphere)), field(&mesh)];
-    let (clipped, mask) = twin::clip::classify::classify(&grid, &opacity, &clips, 32);
+    let (clipped, mask) = twin::clip::classify::classify(&grid, &opacity, &clips, AntiAliasing::N32);
     let unclipped = twin::cast::lao::lao(&grid, &opacity, &occlusion, reference_mm);
     let ambient: Vec<f32> = unclipped.iter().map(|a| *a as f32).collect();
     let view = StereoRig::framing(volume.size_mm(), 30.0, 25.0).views(1.0, 1.0, 1e3).expect("views")[0];
@@ -77,7 +79,7 @@ fn twins(criterion: &mut Criterion) {
     });
     group.bench_function("peel and dilate", |b| b.iter(|| field(black_box(&mesh))));
     group.bench_function("classify", |b| {
-        b.iter(|| twin::clip::classify::classify(&grid, black_box(&opacity), &clips, 32));
+        b.iter(|| twin::clip::classify::classify(&grid, black_box(&opacity), &clips, AntiAliasing::N32));
     });
     group.bench_function("bricks", |b| b.iter(|| twin::field::bricks::to_compute(&grid, black_box(&mask))));
     group.bench_function("contextual", |b| {

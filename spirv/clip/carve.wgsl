@@ -6,16 +6,15 @@
 
 struct CarveParams {
     dims: vec3<u32>,
-    // additional samples where the first nine disagree: N of CAO eq. (5)
-    extra_samples: u32,
-    // mm
-    spacing: vec3<f32>,
     // 1: values or transfer function changed too
     all: u32,
+    // mm
+    spacing: vec3<f32>,
     // value = stored * slope + bias; stored integers of a UNORM texel, 1: the texel is the stored value
     levels: f32,
     slope: f32,
     bias: f32,
+    sampling: Sampling,
 }
 
 // Squared distance in mm from each brick to the nearest changed one.
@@ -120,7 +119,7 @@ fn main(
             let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
             var value = opacity_of(value_of(voxel));
             if value > 0.0 && !is_spared(voxel) {
-                value *= visible_share(code, centre, 0.5 * params.spacing, params.extra_samples);
+                value *= visible_share(code, centre, params.spacing, params.sampling);
             }
             let now = u32(round(value * PARTS));
             let stored = u32(round(textureLoad(opacity, voxel).r * PARTS));

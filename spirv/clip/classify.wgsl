@@ -9,12 +9,11 @@
 
 struct ClassifyParams {
     dims: vec3<u32>,
-    // additional samples where the first nine disagree: N of eq. (5)
-    extra_samples: u32,
+    flags: u32,
     // mm
     spacing: vec3<f32>,
     reach: f32,
-    flags: u32,
+    sampling: Sampling,
 }
 
 struct Count {
@@ -96,7 +95,6 @@ fn any_in_reach(code: u32, world: vec3<f32>) -> bool {
 
 fn classify(voxel: vec3<u32>, code: u32) -> u32 {
     let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
-    let half_edges = 0.5 * params.spacing;
     let literal = (params.flags & LITERAL) != 0u;
     let full = textureLoad(full_opacity, voxel, 0).r;
     var dilated = any_in_reach(code, centre);
@@ -106,12 +104,12 @@ fn classify(voxel: vec3<u32>, code: u32) -> u32 {
     }
     if literal {
         for (var i = 1u; i < FIRST_SAMPLES; i++) {
-            dilated = dilated || any_in_reach(code, centre + first_nine(i) * half_edges);
+            dilated = dilated || any_in_reach(code, centre + first_nine(i) * (params.sampling.corner * params.spacing));
         }
     }
     var share = 1.0;
     if !is_spared(voxel) {
-        share = visible_share(code, centre, half_edges, params.extra_samples);
+        share = visible_share(code, centre, params.spacing, params.sampling);
     }
     textureStore(opacity, voxel, vec4(share * full, 0.0, 0.0, 0.0));
     if !dilated {

@@ -8,6 +8,8 @@ struct ClipBricksParams {
     // mm
     reach: f32,
     spacing: vec3<f32>,
+    // how far beyond a voxel its clip samples lie, in voxels
+    beyond: f32,
 }
 
 @group(0) @binding(0) var<storage, read> clips: Clips;
@@ -140,7 +142,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let first = BRICK * brick_at(index, bricks);
     let last = min(first + (BRICK - 1u), params.dims - 1u);
     let centre = 0.5 * vec3<f32>(vec3<i32>(first + last) - vec3<i32>(params.dims - 1u)) * params.spacing;
-    let half_edges = 0.5 * vec3<f32>(last + 1u - first) * params.spacing;
+    let half_edges = (0.5 * vec3<f32>(last + 1u - first) + params.beyond) * params.spacing;
     var visibility = VISIBLE;
     var reach = NONE;
     var cutting = 0u;

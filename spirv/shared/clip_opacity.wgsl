@@ -6,12 +6,27 @@
 
 // Samples that every voxel has: its centre and its corners.
 const FIRST_SAMPLES = 9u;
-// Further samples where these disagree.
+// Further samples where these disagree: sets of 32 and of 8.
 const MOST_SAMPLES = 32u;
+const FEW_SAMPLES = 8u;
+const PLACES = MOST_SAMPLES + FEW_SAMPLES;
+
+// How voxels are sampled.
+struct Sampling {
+    // additional samples where the first nine disagree: N of CAO eq. (5)
+    more: u32,
+    // the first of their places
+    first: u32,
+    // 1: these alone make the share; 0: all N + 9, as the paper has it
+    interior: u32,
+    // how far from the centre they lie at most along each axis, and how far the corners, in voxels
+    support: f32,
+    corner: f32,
+}
 
 struct Positions {
-    // in the voxel's [-1, 1]^3
-    sample: array<vec4<f32>, MOST_SAMPLES>,
+    // in [-1, 1]^3, whose unit is the support
+    sample: array<vec4<f32>, PLACES>,
 }
 
 // Centre, then the eight corners.
@@ -40,12 +55,13 @@ fn voxel_visibility(among: u32, centre: vec3<f32>, half_edges: vec3<f32>) -> u32
 }
 
 // The share of the voxel with this centre in mm, in a brick with this word of ClipBricks. Samples are taken only where neither
-// the brick's bounds nor the voxel's own decide, which changes no bit of the answer. `more` is N of eq. (5).
-fn visible_share(code: u32, centre: vec3<f32>, half_edges: vec3<f32>, more: u32) -> f32 {
+// the brick's bounds nor the voxel's own decide, which changes no bit of the answer.
+fn visible_share(code: u32, centre: vec3<f32>, spacing: vec3<f32>, how: Sampling) -> f32 {
     let cutting = cutting_in(code);
+    let corner = how.corner * spacing;
     var known = visibility_in(code);
     if known == CUT {
-        known = voxel_visibility(cutting, centre, half_edges);
+        known = voxel_visibility(cutting, centre, corner);
     }
     if known == VISIBLE {
         return 1.0;
@@ -55,13 +71,18 @@ fn visible_share(code: u32, centre: vec3<f32>, half_edges: vec3<f32>, more: u32)
     }
     var seen = 0u;
     for (var i = 0u; i < FIRST_SAMPLES; i++) {
-        seen += u32(visible_to(cutting, centre + first_nine(i) * half_edges));
+        seen += u32(visible_to(cutting, centre + first_nine(i) * corner));
     }
     if seen == 0u || seen == FIRST_SAMPLES {
         return f32(seen / FIRST_SAMPLES);
     }
-    for (var i = 0u; i < more; i++) {
-        seen += u32(visible_to(cutting, centre + positions.sample[i].xyz * half_edges));
+    var asked = FIRST_SAMPLES;
+    if how.interior != 0u && how.more > 0u {
+        seen = 0u;
+        asked = 0u;
     }
-    return f32(seen) / f32(FIRST_SAMPLES + more);
+    for (var i = 0u; i < how.more; i++) {
+        seen += u32(visible_to(cutting, centre + positions.sample[how.first + i].xyz * (how.support * spacing)));
+    }
+    return f32(seen) / f32(asked + how.more);
 }

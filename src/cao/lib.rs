@@ -96,7 +96,7 @@ pub use cao_model::look::Look;
 pub use cao_model::mesh::TriangleMesh;
 pub use cao_model::methods::{METHODS, Method};
 pub use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
-pub use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
+pub use cao_model::settings::{AntiAliasing, Estimator, MapSettings, Samples, Scope, Setup, Support};
 pub use cao_model::transfer::TransferFunction;
 pub use cao_model::view::{StereoRig, View};
 pub use cao_model::volume::Volume;

@@ -133,7 +133,8 @@ impl Subject {
         clip_bricks: &Buffer,
     ) -> Result<()> {
         self.clip_set.record(rec, &self.clips, self.half_diagonal())?;
-        kernel.record(rec, &self.field, &self.clip_set, reach, clip_bricks)?;
+        let support = self.setup.anti_aliasing.support;
+        kernel.record(rec, &self.field, &self.clip_set, reach, support, clip_bricks)?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         Ok(())
     }

@@ -91,15 +91,73 @@ pub enum Scope {
     Needed,
 }
 
-/// Anti-aliasing samples of voxels that a clip surface passes through, beyond centre and corners: N of CAO eq. (5).
+/// How voxels that a clip's surface passes through are sampled (CAO eq. (5), method.md §6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AntiAliasing {
+pub struct AntiAliasing {
+    /// Samples beyond centre and corners: N.
+    pub samples: Samples,
+    /// How far from the centre they lie.
+    pub support: Support,
+    /// Which of them make the share.
+    pub estimator: Estimator,
+}
+
+impl AntiAliasing {
+    /// The default but for N = 0.
+    pub const N0: Self = Self { samples: Samples::N0, ..Self::N32 };
+    /// The default but for N = 8.
+    pub const N8: Self = Self { samples: Samples::N8, ..Self::N32 };
+    /// The default: the paper's N = 32.
+    pub const N32: Self =
+        Self { samples: Samples::N32, support: Support::Voxel, estimator: Estimator::Interior };
+}
+
+/// N of CAO eq. (5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Samples {
     /// None.
     N0 = 0,
     /// 8.
     N8 = 8,
     /// 32, as the paper has it.
     N32 = 32,
+}
+
+/// How far from a voxel's centre its clip samples lie along each axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Support {
+    /// Half a voxel: they fill the voxel.
+    Voxel,
+    /// A voxel, the corners a little more, as the paper's authors have it: they fill eight times the voxel's room.
+    Neighbours,
+}
+
+impl Support {
+    /// The N further samples, in voxels, at most.
+    pub fn extent(self) -> f32 {
+        match self {
+            Self::Voxel => 0.5,
+            Self::Neighbours => 1.0,
+        }
+    }
+
+    /// The corners, in voxels: no sample lies farther out.
+    pub fn corner(self) -> f32 {
+        match self {
+            Self::Voxel => 0.5,
+            Self::Neighbours => 1.025,
+        }
+    }
+}
+
+/// Which samples make the share of a cut voxel that is visible. The first nine decide in either whether it is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimator {
+    /// C_visible / (N + 9), all of them: CAO eq. (5).
+    Paper,
+    /// The N alone. The corners are shared by eight voxels, and a plane along the axes passes four of them at once. With N = 0 as
+    /// [`Self::Paper`].
+    Interior,
 }
 
 /// Settings of the depth maps of clip meshes.

@@ -19,14 +19,16 @@ use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_measure::random::Random;
 use cao_model::clip::Clip;
 use cao_model::feature::{Feature, Features};
-use cao_model::settings::AntiAliasing;
-use cao_model::settings::MapSettings;
+use cao_model::settings::{AntiAliasing, Estimator, MapSettings, Support};
 use cao_model::transfer::TransferFunction;
 use cao_testing::*;
 use cao_twin::Grid;
 use cao_twin::clip::carve::{changed, contact, stored};
 
 const MAPS: MapSettings = MapSettings { resolution: 128, cells: 32, pairs: 4, literal: false };
+
+/// Of a clip's change for `classify`: farther than any clip sample of a voxel, 1.025 of its diagonal.
+const REACH: f32 = 2.0;
 
 struct Bench<'a> {
     gpu: &'a Gpu,
@@ -90,9 +92,10 @@ impl<'a> Bench<'a> {
             self.function = transfer.clone();
         }
         let (field, by) = self.features.opacities().unwrap_or((&self.field, &self.transfer));
-        self.set = self.set.planned(self.gpu, clips, Some(1.0), self.half_mm, MAPS).unwrap();
+        self.set = self.set.planned(self.gpu, clips, Some(REACH), self.half_mm, MAPS).unwrap();
         self.set.make(self.gpu, peel, dilate).unwrap();
         let between = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
+        let support = samples.support;
         run(self.gpu, |rec| {
             let count = &classify.count;
             rec.fill(count, 0, count.bytes(), 0).unwrap();
@@ -104,8 +107,8 @@ impl<'a> Bench<'a> {
             }
             opacity.record(rec, field, by, &self.full).unwrap();
             self.set.record(rec, clips, self.half_mm).unwrap();
-            clip_bricks.record(rec, &self.field, &self.set, 0.0, &self.words[0]).unwrap();
-            clip_bricks.record(rec, &self.field, &self.set, 1.0, &self.words[2]).unwrap();
+            clip_bricks.record(rec, &self.field, &self.set, 0.0, support, &self.words[0]).unwrap();
+            clip_bricks.record(rec, &self.field, &self.set, REACH, support, &self.words[2]).unwrap();
             rec.barrier(&[Access::StorageWrite, Access::TransferWrite], &between);
             let b = Bindings {
                 transfer: by,
@@ -123,7 +126,7 @@ impl<'a> Bench<'a> {
             let (set, words, features) = (&self.set, &self.words[2], &self.features);
             let (full, clipped, mask) = (&self.full, &self.clipped, &self.mask);
             classify
-                .record(rec, field, features, set, samples, 1.0, false, words, full, clipped, mask)
+                .record(rec, field, features, set, samples, REACH, false, words, full, clipped, mask)
                 .unwrap();
         });
     }
@@ -197,7 +200,11 @@ fn opacity_in_place_equals_classification_after_every_edit_and_changes_are_found
                     random_clip(&mut random, shape, size_mm(&grid))
                 })
                 .collect();
-            let samples = [AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][step % 3];
+            let samples = AntiAliasing {
+                support: [Support::Voxel, Support::Neighbours][step / 2 % 2],
+                estimator: [Estimator::Paper, Estimator::Interior][step / 4 % 2],
+                ..[AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][step % 3]
+            };
             bench.run(&kernels, transfer.as_ref(), &clips, samples);
             let after = bench.opacity();
             for (i, expected) in read_floats(&gpu, &bench.clipped).into_iter().enumerate() {

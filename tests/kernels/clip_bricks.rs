@@ -13,9 +13,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
 use cao_model::methods::Method;
 use cao_model::occlusion::Occlusion;
-use cao_model::settings::AntiAliasing;
-use cao_model::settings::MapSettings;
-use cao_model::settings::Setup;
+use cao_model::settings::{AntiAliasing, Estimator, MapSettings, Setup, Support};
 use cao_testing::*;
 use cao_twin as twin;
 use cao_twin::Grid;
@@ -24,6 +22,8 @@ use cao_twin::clip::clips::{ClipField, Dilation, Maps};
 use glam::Vec3;
 
 const MAPS: MapSettings = MapSettings { resolution: 96, cells: 48, pairs: 4, literal: false };
+
+const SUPPORTS: [Support; 2] = [Support::Voxel, Support::Neighbours];
 
 /// Several bricks along each axis, the last of them cut short; equal and unequal spacing.
 const LARGE: [Grid; 2] =
@@ -50,9 +50,16 @@ impl<'a> Bench<'a> {
         Self(Kernels::new(gpu))
     }
 
-    fn scene(&self, grid: &Grid, clips: &[Clip], radius_mm: f32, maps: MapSettings) -> Scene {
+    fn scene(
+        &self,
+        grid: &Grid,
+        clips: &[Clip],
+        radius_mm: f32,
+        maps: MapSettings,
+        support: Support,
+    ) -> Scene {
         let occlusion = Occlusion { radius_mm, ..Occlusion::paper(grid.min_spacing()) };
-        let mut clipped = self.0.clipped(grid, clips, &occlusion, maps);
+        let mut clipped = self.0.clipped(grid, clips, &occlusion, maps, support);
         // Without zeros: what is hidden must be seen to be.
         let mut random = Random::new(1);
         let full: Vec<f32> = (0..grid.len()).map(|_| random.between(0.1, 1.0)).collect();
@@ -69,9 +76,9 @@ impl<'a> Bench<'a> {
     }
 
     fn bricks(&self, scene: &Scene) -> Buffer {
-        let Clipped { field, set, reach, .. } = &scene.clipped;
+        let Clipped { field, set, reach, support, .. } = &scene.clipped;
         let words = ClipBricks::buffer(self.0.gpu, field).unwrap();
-        run(self.0.gpu, |rec| self.0.clip_bricks.record(rec, field, set, *reach, &words).unwrap());
+        run(self.0.gpu, |rec| self.0.clip_bricks.record(rec, field, set, *reach, *support, &words).unwrap());
         words
     }
 
@@ -83,7 +90,7 @@ impl<'a> Bench<'a> {
 
     fn classify(&self, scene: &Scene, words: &Buffer, samples: AntiAliasing) -> Found {
         let Kernels { gpu, classify, .. } = &self.0;
-        let Scene { clipped: Clipped { field, features, set, reach }, full, literal } = scene;
+        let Scene { clipped: Clipped { field, features, set, reach, .. }, full, literal } = scene;
         let count = &classify.count;
         let opacity = volume_image(gpu, "opacity", field, Format::R32Float).unwrap();
         let mask = volume_image(gpu, "mask", field, Format::R8Uint).unwrap();
@@ -131,13 +138,19 @@ fn what_is_said_of_a_brick_holds_for_each_of_its_samples() {
             for turn in 0..4 {
                 let clips = [random_clip(&mut random, &shape, size_mm(&grid))];
                 let radius = [0.0, 3.0][turn % 2];
-                let scene = bench.scene(&grid, &clips, radius, MAPS);
-                let maps = Maps { layers: 1, resolution: 8, dilation: Dilation::Conservative(8) };
+                let how = AntiAliasing { support: SUPPORTS[turn / 2 % 2], ..AntiAliasing::N32 };
+                let scene = bench.scene(&grid, &clips, radius, MAPS, how.support);
+                let maps = Maps {
+                    layers: 1,
+                    resolution: 8,
+                    dilation: Dilation::Conservative(8),
+                    support: how.support,
+                };
                 let reach = Occlusion { radius_mm: radius, ..Occlusion::paper(grid.min_spacing()) };
                 let twins = clips
                     .each_ref()
                     .map(|clip| ClipField::new(clip, &grid, reach.reach(grid.min_spacing()), &maps).unwrap());
-                let truth = twin::clip::clip_bricks::clip_bricks(&grid, &twins, 32);
+                let truth = twin::clip::clip_bricks::clip_bricks(&grid, &twins, how);
                 let found = words(&gpu, &bench.bricks(&scene));
                 assert_eq!(found.len(), truth.len());
                 for (brick, (&word, truth)) in found.iter().zip(&truth).enumerate() {
@@ -208,8 +221,12 @@ fn classification_by_bricks_is_the_same_bit_for_bit() {
     }
     let (mut without_samples, mut bricks, mut categories) = (0, 0, [0; 3]);
     for (n, (grid, clips, maps)) in cases.iter().enumerate() {
-        let samples = [AntiAliasing::N32, AntiAliasing::N8, AntiAliasing::N0][n % 3];
-        let scene = bench.scene(grid, clips, [2.0, 5.0, 0.0][n / 3 % 3], *maps);
+        let samples = AntiAliasing {
+            support: SUPPORTS[n % 2],
+            estimator: [Estimator::Paper, Estimator::Interior][n / 2 % 2],
+            ..[AntiAliasing::N32, AntiAliasing::N8, AntiAliasing::N0][n % 3]
+        };
+        let scene = bench.scene(grid, clips, [2.0, 5.0, 0.0][n / 3 % 3], *maps, samples.support);
         let by_bricks = bench.bricks(&scene);
         let (found, expected) = (
             bench.classify(&scene, &by_bricks, samples),
@@ -244,12 +261,14 @@ fn a_wrong_bound_is_caught() {
                 let pose = Pose { scale: Vec3::splat(scale), translate_mm, ..Pose::default() };
                 [Clip { shape: shape.clone(), mode: Mode::Remove, pose }]
             };
-            let scene = bench.scene(&grid, &clip(10.0), 2.0, MAPS);
-            let right = bench.classify(&scene, &bench.unknown(&scene), AntiAliasing::N8);
-            assert!(bench.classify(&scene, &bench.bricks(&scene), AntiAliasing::N8) == right);
+            let scene = bench.scene(&grid, &clip(10.0), 2.0, MAPS, Support::Voxel);
+            // A corner counts, so that bounds are wrong sooner.
+            let how = AntiAliasing { estimator: Estimator::Paper, ..AntiAliasing::N8 };
+            let right = bench.classify(&scene, &bench.unknown(&scene), how);
+            assert!(bench.classify(&scene, &bench.bricks(&scene), how) == right);
             for (n, scale) in [9.0, 11.0].into_iter().enumerate() {
-                let other = bench.scene(&grid, &clip(scale), 2.0, MAPS);
-                let wrong = bench.classify(&scene, &bench.bricks(&other), AntiAliasing::N8);
+                let other = bench.scene(&grid, &clip(scale), 2.0, MAPS, Support::Voxel);
+                let wrong = bench.classify(&scene, &bench.bricks(&other), how);
                 caught[n] += usize::from(wrong != right);
             }
         }

@@ -11,7 +11,7 @@ use cao_gpu::Gpu;
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
 use cao_model::occlusion::Occlusion;
-use cao_model::settings::MapSettings;
+use cao_model::settings::{MapSettings, Support};
 use cao_testing::{blank, run, size_mm};
 use cao_twin::Grid;
 
@@ -29,6 +29,7 @@ pub struct Clipped {
     pub features: FeatureSet,
     pub set: ClipSet,
     pub reach: f32,
+    pub support: Support,
 }
 
 impl<'a> Kernels<'a> {
@@ -42,16 +43,29 @@ impl<'a> Kernels<'a> {
         }
     }
 
-    pub fn clipped(&self, grid: &Grid, clips: &[Clip], occlusion: &Occlusion, maps: MapSettings) -> Clipped {
+    pub fn clipped(
+        &self,
+        grid: &Grid,
+        clips: &[Clip],
+        occlusion: &Occlusion,
+        maps: MapSettings,
+        support: Support,
+    ) -> Clipped {
         let gpu = self.gpu;
         let field = blank(gpu, grid);
-        let reach = Classify::reach(&field, occlusion);
+        let reach = Classify::reach(&field, occlusion, support);
         let radius = if maps.literal { occlusion.reach(grid.min_spacing()) } else { reach };
         let half_mm = 0.5 * size_mm(grid).length();
         let none = ClipSet::new(gpu).unwrap();
         let mut set = none.planned(gpu, clips, Some(radius), half_mm, maps).unwrap();
         set.make(gpu, &self.peel, &self.dilate).unwrap();
         run(gpu, |rec| set.record(rec, clips, half_mm).unwrap());
-        Clipped { features: FeatureSet::new(gpu, &field, Features::NONE).unwrap(), field, set, reach }
+        Clipped {
+            features: FeatureSet::new(gpu, &field, Features::NONE).unwrap(),
+            field,
+            set,
+            reach,
+            support,
+        }
     }
 }

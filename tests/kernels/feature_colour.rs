@@ -9,6 +9,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
+use cao_model::settings::Support;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::View;
@@ -51,7 +52,12 @@ fn twin(
         opacity.iter().zip(spared(volume, features)).map(|(a, s)| if s { *a } else { 0.0 }).collect();
     let index = index(volume, features);
     let reach = renderer.setup().occlusion.reach(grid.min_spacing());
-    let maps = Maps { layers: 4, resolution: MAPS.resolution, dilation: Dilation::Conservative(MAPS.cells) };
+    let maps = Maps {
+        layers: 4,
+        support: Support::Voxel,
+        resolution: MAPS.resolution,
+        dilation: Dilation::Conservative(MAPS.cells),
+    };
     let fields: Vec<_> =
         clips.iter().map(|clip| ClipField::new(clip, &grid, reach, &maps).unwrap()).collect();
     let frame = twin::draw::raycast::Frame {

@@ -28,10 +28,10 @@ use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::options::Options;
 use cao_model::samples::Filter;
-use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
 use cao_model::settings::Setup;
+use cao_model::settings::{AntiAliasing, Support};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::{StereoRig, Tangents, View, with_insets};
@@ -92,7 +92,9 @@ fn twin(
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
     let ambient = renderer.read_ambient().unwrap();
     let reach = renderer.setup().occlusion.reach(grid.min_spacing());
-    let maps = Maps { layers: 4, resolution: MAPS.resolution, dilation: Dilation::Conservative(MAPS.cells) };
+    let support = renderer.setup().anti_aliasing.support;
+    let dilation = Dilation::Conservative(MAPS.cells);
+    let maps = Maps { layers: 4, resolution: MAPS.resolution, dilation, support };
     let fields: Vec<_> =
         clips.iter().map(|clip| ClipField::new(clip, &grid, reach, &maps).unwrap()).collect();
     let frame = twin::draw::raycast::Frame {
@@ -499,7 +501,9 @@ impl Stages {
             rec.barrier(&[], &[Access::StorageWrite]);
             opacity.record(rec, field, transfer, &volumes.full_opacity).unwrap();
             occupancy.record(rec, field, transfer, &stages.features, &stages.occupancy).unwrap();
-            clip_bricks.record(rec, &stages.field, &stages.clips, 2.0, &volumes.clip_bricks).unwrap();
+            clip_bricks
+                .record(rec, &stages.field, &stages.clips, 2.0, Support::Voxel, &volumes.clip_bricks)
+                .unwrap();
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
             distance
                 .record(rec, &stages.field, &stages.occupancy, &volumes.clip_bricks, &stages.distances)

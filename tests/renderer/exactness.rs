@@ -15,10 +15,10 @@ use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::options::Options;
-use cao_model::settings::AntiAliasing;
 use cao_model::settings::MapSettings;
 use cao_model::settings::Scope;
 use cao_model::settings::Setup;
+use cao_model::settings::{AntiAliasing, Estimator, Support};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
@@ -150,8 +150,11 @@ fn edit(random: &mut Random, renderer: &mut Renderer, volume: &Volume, shapes: &
                 _ => {
                     let (resolution, cells) = [(16, 4), (33, 11), (48, 48), (128, 32)][pick(random, 4)];
                     next.maps = MapSettings { resolution, cells, ..next.maps };
-                    next.anti_aliasing =
-                        [AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][pick(random, 3)];
+                    next.anti_aliasing = AntiAliasing {
+                        support: [Support::Voxel, Support::Neighbours][pick(random, 2)],
+                        estimator: [Estimator::Paper, Estimator::Interior][pick(random, 2)],
+                        ..[AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][pick(random, 3)]
+                    };
                 }
             }
             renderer.set_setup(next).unwrap();

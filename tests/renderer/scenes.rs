@@ -9,7 +9,7 @@ use cao_model::feature::{Feature, Features};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::Options;
-use cao_model::settings::{AntiAliasing, MapSettings, Scope, Setup};
+use cao_model::settings::{AntiAliasing, Estimator, MapSettings, Scope, Setup, Support};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::volume::Volume;
@@ -117,8 +117,11 @@ impl Scene {
                     }
                     3 => next.scope = [Scope::All, Scope::Needed][pick(random, 2)],
                     _ => {
-                        next.anti_aliasing =
-                            [AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][pick(random, 3)];
+                        next.anti_aliasing = AntiAliasing {
+                            support: [Support::Voxel, Support::Neighbours][pick(random, 2)],
+                            estimator: [Estimator::Paper, Estimator::Interior][pick(random, 2)],
+                            ..[AntiAliasing::N0, AntiAliasing::N8, AntiAliasing::N32][pick(random, 3)]
+                        };
                     }
                 }
                 renderer.set_setup(self.setup).unwrap();

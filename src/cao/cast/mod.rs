@@ -19,11 +19,16 @@ use cao_model::settings::{Scope, Setup};
 
 /// How far in mm dilation maps reach; the literal recipe dilates by the ray's length alone.
 pub(crate) fn map_radius(on: &Subject) -> f32 {
-    let Setup { occlusion, maps, .. } = &on.wanted;
+    let Setup { occlusion, maps, anti_aliasing, .. } = &on.wanted;
     match maps.literal {
         true => occlusion.reach(f64::from(on.field.min_spacing())),
-        false => Classify::reach(&on.field, occlusion),
+        false => Classify::reach(&on.field, occlusion, anti_aliasing.support),
     }
+}
+
+/// How far in mm a clip's change reaches, with the settings of the last update.
+fn clip_reach(on: &Subject) -> f32 {
+    Classify::reach(&on.field, &on.setup.occlusion, on.setup.anti_aliasing.support)
 }
 
 /// Rays and V_o before clipping, as far as they changed.
@@ -46,7 +51,7 @@ fn unclipped<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject, changed: Chang
 /// V_o after clipping, and the category of every voxel (CAO §3.5 step 4).
 fn classified<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
     Part::short(stages::CLASSIFY, |rec| {
-        let reach = Classify::reach(&on.field, &on.setup.occlusion);
+        let reach = clip_reach(on);
         on.record_clip_bricks(rec, &k.clip_bricks, reach, &v.clip_bricks)?;
         let count = &k.classify.count;
         rec.fill(count, 0, count.bytes(), 0)?;
@@ -71,7 +76,7 @@ fn classified<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
 
 /// The clips as pictures need them, and what they do to each brick.
 fn clips<'a>(k: &'a Kernels, v: &'a Volumes, on: &'a Subject) -> Part<'a> {
-    let reach = Classify::reach(&on.field, &on.setup.occlusion);
+    let reach = clip_reach(on);
     Part::short(stages::CLIPS, move |rec| on.record_clip_bricks(rec, &k.clip_bricks, reach, &v.clip_bricks))
 }
 

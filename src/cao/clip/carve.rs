@@ -75,12 +75,12 @@ impl Carve {
         let slope = field.scale / levels;
         let params = kernel::CarveParams {
             dims,
-            extra_samples: samples as u32,
             spacing,
             all: u32::from(all),
             levels,
             slope,
             bias,
+            sampling: positions::sampling(samples),
             pad: Default::default(),
         };
         let params = bytemuck::bytes_of(&params);

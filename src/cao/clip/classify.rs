@@ -14,7 +14,7 @@ use cao_gpu::{Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
 use cao_kernels::classify as kernel;
 pub use cao_kernels::shared::categories::{AFFECTED, CLIPPED, UNTOUCHED};
 use cao_model::occlusion::Occlusion;
-use cao_model::settings::AntiAliasing;
+use cao_model::settings::{AntiAliasing, Support};
 
 /// The kernel `classify`.
 pub struct Classify {
@@ -34,11 +34,12 @@ impl Classify {
         })
     }
 
-    /// How far in mm a clip's change reaches: the longest ray, the eight voxels that its last sample interpolates, the
-    /// cell that one clip sample stands for, and a hundredth of a voxel for rounding, of which the 1/512 voxel of texture
+    /// How far in mm a clip's change reaches: the longest ray, the eight voxels that its last sample interpolates, the way
+    /// from a voxel to its farthest clip sample, and a hundredth of a voxel for rounding, of which the 1/512 voxel of texture
     /// coordinates on GPUs is the most (method.md §5).
-    pub fn reach(field: &Field, occlusion: &Occlusion) -> f32 {
-        occlusion.reach(f64::from(field.min_spacing())) + (1.5 + 1e-2) * field.diagonal()
+    pub fn reach(field: &Field, occlusion: &Occlusion, support: Support) -> f32 {
+        let samples = 1.0 + support.corner() + 1e-2;
+        occlusion.reach(f64::from(field.min_spacing())) + samples * field.diagonal()
     }
 
     /// Classifies every voxel. `count` must have been cleared; `clip_bricks` is of the same clips and reach.
@@ -59,10 +60,10 @@ impl Classify {
     ) -> Result<()> {
         let params = kernel::ClassifyParams {
             dims: field.dims,
-            extra_samples: samples as u32,
             spacing: field.spacing,
             reach,
             flags: if literal { kernel::LITERAL } else { 0 },
+            sampling: positions::sampling(samples),
             pad: Default::default(),
         };
         let binds = kernel::MainBindings {

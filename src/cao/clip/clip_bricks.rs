@@ -12,6 +12,7 @@ use crate::host::rows_over;
 use cao_gpu::Result;
 use cao_gpu::{Buffer, BufferUse, Gpu, Pipeline, Recorder};
 use cao_kernels::clip_bricks as kernel;
+use cao_model::settings::Support;
 
 pub use cao_kernels::shared::clip_codes::UNKNOWN;
 
@@ -31,17 +32,19 @@ impl ClipBricks {
         gpu.buffer("clip bricks", 4 * u64::from(field.brick_count()), BufferUse::Device)
     }
 
-    /// Writes the word of every brick. `reach` in mm is how far a clip's change reaches, as `classify` has it.
+    /// Writes the word of every brick. `reach` in mm is how far a clip's change reaches, as `classify` has it, and `support` where
+    /// the clip samples of voxels lie.
     pub fn record(
         &self,
         rec: &mut Recorder,
         field: &Field,
         clips: &ClipSet,
         reach: f32,
+        support: Support,
         clip_bricks: &Buffer,
     ) -> Result<()> {
         let (dims, spacing) = (field.dims, field.spacing);
-        let params = kernel::ClipBricksParams { dims, reach, spacing, pad: Default::default() };
+        let params = kernel::ClipBricksParams { dims, reach, spacing, beyond: support.corner() - 0.5 };
         let binds = kernel::MainBindings {
             clips: &clips.clips,
             layers: &clips.layers,

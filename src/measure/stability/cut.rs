@@ -13,6 +13,7 @@ use crate::reference::image;
 use cao_gpu::Gpu;
 use cao_model::look::Look;
 use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
+use cao_model::settings::Support;
 use cao_twin::clip::clips::{ClipField, Dilation, Maps};
 use cao_twin::draw::raycast::{Frame, raycast};
 use cao_twin::measure::reference::reference;
@@ -168,7 +169,8 @@ fn pictures(
     ambient: [&[f32]; 2],
     offset: f64,
 ) -> Result<[f64; 2]> {
-    let maps = Maps { layers: 1, resolution: 8, dilation: Dilation::Conservative(8) };
+    let maps =
+        Maps { layers: 1, resolution: 8, dilation: Dilation::Conservative(8), support: Support::Voxel };
     let clips = [ClipField::new(&cut.clip(place), &cut.grid, RADIUS, &maps)?];
     let values: Vec<f32> = (0..cut.volume.len()).map(|i| cut.volume.value(i) as f32).collect();
     let frame = |ambient| Frame {

@@ -18,6 +18,7 @@ pub mod numbers;
 pub mod page;
 pub mod pixels;
 mod plane_cut;
+mod progressive;
 pub mod radius;
 pub mod sheets;
 pub mod shells;
@@ -88,8 +89,17 @@ impl Series {
 
     /// Measured value where the parameter is nearest to `x`; NaN of nothing.
     pub fn at(&self, x: f64) -> f64 {
+        self.nearest_to(x)[1]
+    }
+
+    /// The parameter's value nearest to `x`; NaN of nothing.
+    pub fn nearest(&self, x: f64) -> f64 {
+        self.nearest_to(x)[0]
+    }
+
+    fn nearest_to(&self, x: f64) -> [f64; 2] {
         let nearest = self.points.iter().min_by(|a, b| (a[0] - x).abs().total_cmp(&(b[0] - x).abs()));
-        nearest.map_or(f64::NAN, |point| point[1])
+        nearest.copied().unwrap_or([f64::NAN; 2])
     }
 }
 

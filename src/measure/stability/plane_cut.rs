@@ -28,8 +28,6 @@ pub struct PlaneCut {
     pub transfer: TransferFunction,
     /// Its shape.
     pub grid: Grid,
-    /// Opacity before clipping.
-    pub full: Vec<f32>,
     /// (y, z) of points of the face inside the object, every half voxel, index coordinates.
     pub face: Vec<[f64; 2]>,
     /// Index coordinate x from which the face moves down.
@@ -57,7 +55,7 @@ impl PlaneCut {
                 (0..=way).all(|w| on(start - w as f64))
             })
             .collect();
-        Ok(Self { renderer, volume, transfer, grid, full, face, start })
+        Ok(Self { renderer, volume, transfer, grid, face, start })
     }
 
     /// The clip that puts the face `way` voxels from its start.

@@ -32,6 +32,19 @@ pub fn lao(grid: &Grid, opacity: &[f32], occlusion: &Occlusion, reference_mm: f6
     each(grid.len(), |i| along(&rays, grid, opacity, occlusion, reference_mm, grid.voxel(i)))
 }
 
+/// The weight of each direction and every voxel's A_k along it, one at a time.
+pub fn lao_by_direction<'a>(
+    grid: &'a Grid,
+    opacity: &'a [f32],
+    occlusion: &'a Occlusion,
+    reference_mm: f64,
+) -> impl Iterator<Item = (f64, Vec<f64>)> + 'a {
+    rays(grid, occlusion).into_iter().map(move |(direction, weight)| {
+        let ray = [(direction, 1.0)];
+        (weight, each(grid.len(), |i| along(&ray, grid, opacity, occlusion, reference_mm, grid.voxel(i))))
+    })
+}
+
 /// Ambient value of one voxel.
 pub fn lao_at(
     grid: &Grid,

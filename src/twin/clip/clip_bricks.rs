@@ -4,6 +4,7 @@ use crate::clip::classify::sample_positions;
 use crate::clip::clips::{ClipField, visible};
 use crate::field::bricks::{EDGE, bricks};
 use crate::{Grid, each};
+use cao_model::settings::AntiAliasing;
 use glam::Vec3;
 
 /// How many of a brick's points, or voxels, have a property.
@@ -37,18 +38,18 @@ impl Share {
 /// What the clips do to one brick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Brick {
-    /// Of all samples of its voxels, the `more` further ones included, which are visible.
+    /// Of all samples of its voxels, the N further ones included, which are visible.
     pub visible: Share,
     /// Of its voxels, which have a point that some clip hides within reach.
     pub affected: Share,
 }
 
-/// Every brick of [`bricks`], x fastest. `more` is N of CAO eq. (5).
-pub fn clip_bricks(grid: &Grid, clips: &[ClipField], more: u32) -> Vec<Brick> {
-    let positions = sample_positions(more);
+/// Every brick of [`bricks`], x fastest.
+pub fn clip_bricks(grid: &Grid, clips: &[ClipField], how: AntiAliasing) -> Vec<Brick> {
+    let positions = sample_positions(how);
     let world = |voxel: [usize; 3]| -> Vec<Vec3> {
         let place = |p: &[f64; 3]| {
-            let at = grid.to_world(std::array::from_fn(|axis| voxel[axis] as f64 + 0.5 * p[axis]));
+            let at = grid.to_world(std::array::from_fn(|axis| voxel[axis] as f64 + p[axis]));
             Vec3::from_array(at.map(|c| c as f32))
         };
         positions.iter().map(place).collect()
@@ -83,7 +84,7 @@ mod tests {
         let clip = |mode| [field(&Clip { shape: Shape::Plane, mode, pose: Pose::default() }, &GRID, 0.0)];
         let [all, cut, none] = [Share::All, Share::Some, Share::None];
         let of = |mode| {
-            let found = clip_bricks(&GRID, &clip(mode), 8);
+            let found = clip_bricks(&GRID, &clip(mode), AntiAliasing::N8);
             (found.iter().map(|b| b.visible).collect(), found.iter().map(|b| b.affected).collect())
         };
         let (visible, affected): (Vec<_>, Vec<_>) = of(Mode::Remove);
@@ -97,6 +98,6 @@ mod tests {
     #[test]
     fn without_clips_all_is_visible_and_nothing_affected() {
         let clear = Brick { visible: Share::All, affected: Share::None };
-        assert_eq!(clip_bricks(&Grid { dims: [9, 8, 8], ..GRID }, &[], 0), [clear; 2]);
+        assert_eq!(clip_bricks(&Grid { dims: [9, 8, 8], ..GRID }, &[], AntiAliasing::N0), [clear; 2]);
     }
 }

@@ -13,6 +13,7 @@ use crate::clip::dilate::{self, DilationMap};
 use crate::clip::peel::{Report, peel};
 use cao_model::Result;
 use cao_model::clip::{Clip, ClipCamera, Mode, Shape};
+use cao_model::settings::Support;
 use glam::{DVec3, Vec3};
 
 /// Depth in `front` of a pixel without a surface, behind everything, and in `back`, before everything.
@@ -56,6 +57,8 @@ pub struct Maps {
     pub resolution: u32,
     /// Recipe of the dilation maps.
     pub dilation: Dilation,
+    /// Where the clip samples of voxels lie.
+    pub support: Support,
 }
 
 /// Recipe of the dilation maps.
@@ -102,7 +105,7 @@ impl ClipField {
     pub fn new(clip: &Clip, grid: &Grid, reach_mm: f32, maps: &Maps) -> Result<Self> {
         let radius_mm = match maps.dilation {
             Dilation::Conservative(_) => {
-                let radius = dilate::changed_radius(grid, reach_mm);
+                let radius = dilate::changed_radius(grid, reach_mm, maps.support);
                 let edge = |axis: usize| grid.dims[axis] as f64 * grid.spacing[axis];
                 let half = 0.5 * DVec3::new(edge(0), edge(1), edge(2)).length();
                 radius + clip.rounding_mm(half as f32, radius)
@@ -164,7 +167,8 @@ mod tests {
     use std::sync::Arc;
 
     const GRID: Grid = Grid { dims: [9; 3], spacing: [1.0; 3] };
-    const MAPS: Maps = Maps { layers: 4, resolution: 256, dilation: Dilation::Conservative(64) };
+    const MAPS: Maps =
+        Maps { layers: 4, resolution: 256, dilation: Dilation::Conservative(64), support: Support::Voxel };
 
     fn field(shape: Shape, mode: Mode, pose: Pose) -> ClipField {
         ClipField::new(&Clip { shape, mode, pose }, &GRID, 2.0, &MAPS).unwrap()

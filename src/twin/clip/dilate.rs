@@ -14,6 +14,7 @@
 use crate::clip::clips::{MeshLayers, NO_BACK, NO_FRONT, pixel};
 use crate::{Grid, each};
 use cao_model::clip::{ClipCamera, Mode};
+use cao_model::settings::Support;
 use cao_model::{Error, Result};
 use glam::Vec3;
 
@@ -39,10 +40,10 @@ impl DilationMap {
 }
 
 /// Radius in mm around a hidden region within which a voxel's ambient value may change (method.md §5): the reach of
-/// its rays, the voxel diagonal over which a sample interpolates, half a diagonal from a voxel's centre to its
+/// its rays, the voxel diagonal over which a sample interpolates, the way from a voxel's centre to its farthest
 /// clip samples, and a hundredth for rounding, of which the 1/512 voxel of a GPU's texture coordinates is the most.
-pub fn changed_radius(grid: &Grid, reach_mm: f32) -> f32 {
-    (f64::from(reach_mm) + (1.5 + 1e-2) * grid.diagonal()) as f32
+pub fn changed_radius(grid: &Grid, reach_mm: f32, support: Support) -> f32 {
+    (f64::from(reach_mm) + (1.0 + f64::from(support.corner()) + 1e-2) * grid.diagonal()) as f32
 }
 
 /// A dilation map of which each cell is computed when it is asked for: of the largest maps the few cells that matter take seconds,
@@ -58,6 +59,8 @@ pub struct Cells {
     /// For each |dy| the half-heights of the ball over dx = −n … n, as far as it reaches.
     heights: Vec<Vec<f64>>,
     half: bool,
+    /// Depths are interpolated between the four cells around a point, instead of those of the cell that it falls into.
+    bilinear: bool,
 }
 
 impl Cells {
@@ -118,6 +121,22 @@ impl Cells {
         Self::new(camera, mode, pixels, r_xy as usize, height, half)
     }
 
+    /// The map of the paper's authors' program, as far as its public code says: as [`Self::literal`], but the radius in pixels is rounded
+    /// up, the dilated depths are half floats, and they are read bilinearly. Its radius in mm is `radius_mm`, to which the program gives the length
+    /// of a ray and a voxel's diagonal.
+    pub fn programmed(layers: &MeshLayers, mode: Mode, radius_mm: f32) -> Self {
+        let camera = layers.camera;
+        let side = camera.resolution as usize;
+        let pixels = (0..side * side).map(|pixel| interval(layers, mode, pixel));
+        let r_xy = f64::from(radius_mm / camera.pixel_mm).ceil();
+        let r_z = f64::from(radius_mm / camera.depth_mm);
+        let height = |dx: usize, dy: usize| {
+            let square = 1.0 - (dx * dx + dy * dy) as f64 / (r_xy * r_xy);
+            (square >= 0.0).then(|| r_z * square.sqrt())
+        };
+        Self { bilinear: true, ..Self::new(camera, mode, pixels, r_xy as usize, height, true) }
+    }
+
     /// Intervals of cells, to be grown (remove) or shrunk (keep) by those of all cells within `span`, where
     /// `height(|dx|, |dy|)` is the half-height of the ball at that distance.
     fn new(
@@ -138,7 +157,7 @@ impl Cells {
             let right: Vec<f64> = (0..=span).map_while(|dx| height(dx, dy)).collect();
             right.iter().skip(1).rev().chain(&right).copied().collect()
         };
-        Self { camera, mode, front, back, heights: (0..=span).map(row).collect(), half }
+        Self { camera, mode, front, back, heights: (0..=span).map(row).collect(), half, bilinear: false }
     }
 
     /// D_front and D_back of one cell. Beyond the map everything is empty.
@@ -165,7 +184,34 @@ impl Cells {
 
     /// Whether a point of the mesh's rigid frame (mm) may be within the radius of the region that the clip hides.
     pub fn dilated(&self, rigid: Vec3) -> bool {
-        holds(&self.camera, self.mode, rigid, |cell| self.cell(cell))
+        match self.bilinear {
+            true => self.between_cells(rigid) == (self.mode == Mode::Remove),
+            false => holds(&self.camera, self.mode, rigid, |cell| self.cell(cell)),
+        }
+    }
+
+    /// Whether a point lies in the interval that a linear sampler reads there; nothing does outside the map. A cell without anything holds
+    /// the depths that a map is cleared to, 1 and 0.
+    fn between_cells(&self, rigid: Vec3) -> bool {
+        let p = self.camera.map(rigid);
+        if pixel(&self.camera, p).is_none() {
+            return false;
+        }
+        let side = self.camera.resolution as usize;
+        let [x, y] = [p.x, p.y].map(|c| f64::from(c) - 0.5);
+        let mut sum = [0.0; 2];
+        for n in 0..4 {
+            let at = |c: f64, step: usize| {
+                let low = c.floor();
+                let weight = if step == 0 { 1.0 - (c - low) } else { c - low };
+                ((low + step as f64).clamp(0.0, (side - 1) as f64) as usize, weight)
+            };
+            let ((i, u), (j, v)) = (at(x, n % 2), at(y, n / 2));
+            let depths = self.cell(j * side + i).map(f64::from);
+            let depths = if depths == EMPTY { [1.0, 0.0] } else { depths };
+            sum = [0, 1].map(|side| sum[side] + u * v * depths[side]);
+        }
+        sum[0] < f64::from(p.z) && f64::from(p.z) < sum[1]
     }
 
     /// All cells.
@@ -413,6 +459,38 @@ mod tests {
     }
 
     /// So the property above can fail, and the paper's recipe does.
+    /// A flat face moves by the radius, and a linear sampler reads the same between its cells; the radius rounded up to pixels reaches a pixel's
+    /// part farther sideways than eq. (4) does.
+    #[test]
+    fn the_programmed_map_reads_between_cells_and_rounds_its_radius_up() {
+        let radius = 1.3;
+        let layers = layers(&TriangleMesh::cuboid(), 4.0, radius, 64);
+        let pixel = layers.camera.pixel_mm;
+        let programmed = Cells::programmed(&layers, Mode::Remove, radius);
+        let literal = Cells::literal(&layers, Mode::Remove, radius, false);
+        let mut found = [0; 4];
+        // In the middle of a face along the depth, a grid finer than the cells.
+        for n in 0..400 {
+            let place = |n: i32| (n as f32 - 10.0) * 0.13 * pixel;
+            let face = 4.0 * 1.1;
+            for (k, z) in [face + radius - 0.02, face + radius + 0.02].into_iter().enumerate() {
+                found[k] += usize::from(programmed.dilated(Vec3::new(place(n % 20), place(n / 20), z)));
+            }
+        }
+        assert_eq!(&found[..2], &[400, 0]);
+        // Sideways, at the level of the box.
+        let reach = |map: &Cells| {
+            (0..400)
+                .map(|n| 4.0 + n as f32 * 0.05 * pixel)
+                .take_while(|&x| map.dilated(Vec3::new(x, 0.1, 0.1)))
+                .last()
+                .unwrap()
+        };
+        let rounded = (radius / pixel).ceil() * pixel;
+        assert!(reach(&programmed) > reach(&literal), "{} {}", reach(&programmed), reach(&literal));
+        assert!((reach(&programmed) - 4.0 - rounded).abs() < 1.1 * pixel, "{} {rounded}", reach(&programmed));
+    }
+
     #[test]
     fn literal_map_misses_points_within_the_radius() {
         for (name, mesh) in shapes() {
