@@ -43,6 +43,7 @@ fn twins(criterion: &mut Criterion) {
     let frame = Frame {
         grid,
         values: &values,
+        parts: None,
         transfer: &transfer,
         reference_mm,
         ambient: &ambient,

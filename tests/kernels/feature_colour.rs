@@ -204,7 +204,7 @@ fn where_two_features_meet_there_is_no_shell_of_a_third() {
 #[test]
 fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_is_near_it() {
     let gpu = open();
-    let volume = builtin_box("fruit", [64, 60, 56], [1.0; 3]).unwrap();
+    let volume = builtin_box("fruit", [48, 44, 48], [1.0; 3]).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let state = |renderer: &Renderer| (renderer.read_opacity().unwrap(), renderer.read_ambient().unwrap());
     for method in methods() {
@@ -218,7 +218,7 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let grid = grid_of(&volume);
         let core = |i: usize| {
             let p = grid.to_world(grid.voxel(i).map(|c| c as f64));
-            u8::from(p.iter().map(|c| c * c).sum::<f64>() < 144.0)
+            u8::from(p.iter().map(|c| c * c).sum::<f64>() < 36.0)
         };
         let labels = (0..grid.len()).map(core).collect();
         let mut features = Features::by_labels(vec![Feature::new("core")], volume.dims, labels).unwrap();
@@ -234,7 +234,7 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let hidden = state(&renderer);
         assert!(hidden.0 != before.0 && hidden.1 != before.1, "{}", method.name());
         if method.entry().contextual && method.values() == method {
-            // A ball of 12 mm and what is within 6 mm of it, in whole bricks, of a volume of 60 mm.
+            // A ball of 6 mm and what is within 6 mm of it, in whole bricks, of a volume of 48 mm.
             let found = renderer.categories().unwrap();
             let computed = found.affected as f64 / volume.len() as f64;
             assert!(computed > 0.02 && computed < 0.5, "{}: {computed}", method.name());
