@@ -45,6 +45,7 @@ fn twins(criterion: &mut Criterion) {
     let frame = Frame {
         grid,
         values: &values,
+        parts: None,
         transfer: &transfer,
         reference_mm,
         ambient: &ambient,

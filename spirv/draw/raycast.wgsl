@@ -506,7 +506,12 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
         }
         var unlit = tint / stops;
         if featured {
-            unlit = colour_at(start + t_shown * along);
+            let owner = owner_of(start + t_shown * along);
+            unlit = colour_by(owner);
+            if params.channels == 1u {
+                // Of no feature: whatever is darkest there. With more features than channels all of them hold the same.
+                channel = select((owner.feature - 1u) % LEAST, LEAST, owner.feature == 0u);
+            }
         }
         let at = Shown(
             start + t_shown * along,
@@ -517,11 +522,6 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
             select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,
         );
-        if featured && params.channels == 1u {
-            // Of no feature: whatever is darkest there. With more features than channels all of them hold the same.
-            let feature = owner_of(at.position).feature;
-            channel = select((feature - 1u) % LEAST, LEAST, feature == 0u);
-        }
         colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
         only_spared = false;
         alpha += (1.0 - alpha) * stops;

@@ -245,47 +245,66 @@ fn far_cells(start: Rays, voxel: vec3<u32>, interior: bool, k: u32, base: u32, n
     return rays;
 }
 
-// Each feature's opacity at so many half steps on a ray that begins half a step out: the filter's, where it reads one feature only, else
-// by hand.
-fn filtered(voxel: vec3<u32>, corner: vec3<u32>, k: u32, base: u32, half_steps: f32) -> vec4<f32> {
-    let at = vec3<f32>(voxel) + 0.5 + (half_steps + 2.0 * params.shift) * directions.all[k].half_step;
-    let a = textureSampleLevel(opacity, field, at * (1.0 / vec3<f32>(params.dims)), 0.0).r;
-    if a == 0.0 {
-        return vec4(0.0);
-    }
+// Codes of the eight voxels around a place, x fastest, four bits each.
+fn eight_codes(first: vec3<u32>, corner: vec3<u32>) -> u32 {
+    var eight = 0u;
     if params.close == 1u {
-        let here = atomicLoad(&present);
-        if countOneBits(here) == 1u {
-            return select(vec4(0.0), vec4(a), channel(firstTrailingBit(here), base));
+        let place = first + MARGIN - corner;
+        // Two neighbours of a row are in one word or in two.
+        let word = (place.z * BOX + place.y) * (BOX / CODES) + place.x / CODES;
+        let at = 4u * (place.x % CODES);
+        for (var n = 0u; n < 4u; n++) {
+            let row = word + ((n >> 1u) * BOX + (n & 1u)) * (BOX / CODES);
+            let next = codes[min(row + 1u, BOX * BOX * BOX / CODES - 1u)];
+            let pair = codes[row] >> at | select(next << (32u - at), 0u, at == 0u);
+            eight |= (pair & 255u) << (8u * n);
         }
+        return eight;
     }
+    for (var n = 0u; n < 8u; n++) {
+        eight |= code_of(first + vec3(n & 1u, n >> 1u & 1u, n >> 2u)) << (4u * n);
+    }
+    return eight;
+}
+
+// Each wanted feature's opacity at so many half steps on a ray that begins half a step out: the filter's, where it reads one feature only, else
+// by hand.
+fn filtered(voxel: vec3<u32>, corner: vec3<u32>, k: u32, base: u32, wanted: vec4<bool>, half_steps: f32) -> vec4<f32> {
+    let at = vec3<f32>(voxel) + 0.5 + (half_steps + 2.0 * params.shift) * directions.all[k].half_step;
+    let here = atomicLoad(&present);
+    var eight = 0u;
+    var one = firstTrailingBit(here);
     let low = floor(at - 0.5);
     let first = vec3<u32>(vec3<i32>(low));
-    var bits = 0u;
-    var eight = 0u;
-    for (var n = 0u; n < 8u; n++) {
-        let there = first + vec3(n & 1u, n >> 1u & 1u, n >> 2u);
-        var code = 0u;
-        if params.close == 1u {
-            code = code_at(there + MARGIN - corner);
-        } else {
-            code = code_of(there);
+    if params.close == 0u || countOneBits(here) != 1u {
+        eight = eight_codes(first, corner);
+        // The lowest bit of each code that is not 0, and the first such code in all of these.
+        let some = (eight | eight >> 1u | eight >> 2u | eight >> 3u) & 0x11111111u;
+        if some == 0u {
+            return vec4(0.0);
         }
-        eight |= code << (4u * n);
-        bits |= select(0u, 1u << code, code != 0u);
+        one = eight >> firstTrailingBit(some) & 15u;
+        if ((eight ^ (one * 0x11111111u)) & (some * 15u)) != 0u {
+            one = 0u;
+        }
     }
-    if countOneBits(bits) == 1u {
-        return select(vec4(0.0), vec4(a), channel(firstTrailingBit(bits), base));
+    if one != 0u {
+        let own = wanted & channel(one, base);
+        if !any(own) {
+            return vec4(0.0);
+        }
+        let a = textureSampleLevel(opacity, field, at * (1.0 / vec3<f32>(params.dims)), 0.0).r;
+        return select(vec4(0.0), vec4(a), own);
     }
     let w = at - 0.5 - low;
     var sum = vec4(0.0);
     for (var n = 0u; n < 8u; n++) {
-        let code = eight >> (4u * n) & 15u;
-        if code != 0u {
+        let own = wanted & channel(eight >> (4u * n) & 15u, base);
+        if any(own) {
             let side = vec3(n & 1u, n >> 1u & 1u, n >> 2u);
             let weights = select(1.0 - w, w, side == vec3(1u));
             let share = weights.x * weights.y * weights.z * opacity_at(first + side);
-            sum += select(vec4(0.0), vec4(share), channel(code, base));
+            sum += select(vec4(0.0), vec4(share), own);
         }
     }
     return sum;
@@ -296,20 +315,20 @@ fn traced(voxel: vec3<u32>, corner: vec3<u32>, interior: bool, k: u32, base: u32
     if rule == NEAREST {
         return far_cells(rays, voxel, interior, k, base, 0u, true).sum;
     }
-    let first = 1.0 - sqrt(clear(filtered(voxel, corner, k, base, 1.5)));
+    let first = 1.0 - sqrt(clear(filtered(voxel, corner, k, base, wanted, 1.5)));
     rays = pass_cells(rays, in_steps(first), 1u);
     if rule == HYBRID || params.cells > 1u {
-        let second = 1.0 - sqrt(clear(filtered(voxel, corner, k, base, 2.5)));
+        let second = 1.0 - sqrt(clear(filtered(voxel, corner, k, base, wanted, 2.5)));
         rays = pass_cells(rays, in_steps(second), 1u);
     }
     if rule == HYBRID {
-        rays = pass_cells(rays, in_steps(filtered(voxel, corner, k, base, 4.0)), 2u);
-        rays = pass_cells(rays, in_steps(filtered(voxel, corner, k, base, 6.0)), 2u);
+        rays = pass_cells(rays, in_steps(filtered(voxel, corner, k, base, wanted, 4.0)), 2u);
+        rays = pass_cells(rays, in_steps(filtered(voxel, corner, k, base, wanted, 6.0)), 2u);
         return far_cells(rays, voxel, interior, k, base, NEAR, false).sum;
     }
     rays = ended(rays);
     for (var m = 2u; m <= params.cells && !all_dark(rays); m++) {
-        let of_step = in_steps(filtered(voxel, corner, k, base, f32(2u * m)));
+        let of_step = in_steps(filtered(voxel, corner, k, base, wanted, f32(2u * m)));
         rays = ended(pass_cells(rays, of_step, select(2u, 1u, m == params.cells)));
     }
     return rays.sum;

@@ -54,8 +54,7 @@ fn owner_of(position: vec3<f32>) -> Owner {
     return Owner(own, l, h, across, w.z, low, high);
 }
 
-fn colour_at(position: vec3<f32>) -> vec3<f32> {
-    let owner = owner_of(position);
+fn colour_by(owner: Owner) -> vec3<f32> {
     let own = owner.feature;
     let colour = features.each[own].colour;
     if colour.w == 1.0 {

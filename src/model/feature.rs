@@ -184,9 +184,8 @@ impl Features {
             return Err(Error::refused("intervals", problem));
         }
         for (place, &[low, high]) in all.iter().enumerate() {
-            // No number is in none, so that NaN is refused, too.
-            let holds_some = low < high;
-            if !holds_some {
+            // NaN is in no order.
+            if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) {
                 let problem = format!(
                     "its interval from {low} to {high} is empty; expected a first value that belongs to it and a larger one that ends it"
                 );

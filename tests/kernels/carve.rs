@@ -181,7 +181,7 @@ fn opacity_in_place_equals_classification_after_every_edit_and_changes_are_found
                 let mut feature = |k: usize| Feature {
                     visible: random.below(4) > 0,
                     scale: random.between(0.2, 2.0),
-                    spared: (step / 10 + k) % 2 == 0,
+                    spared: (step / 10 + k).is_multiple_of(2),
                     ..Feature::new(k.to_string())
                 };
                 let list = (0..3).map(&mut feature).collect();

@@ -3,13 +3,14 @@
 
 use crate::raycast::{MAPS, SIZE, compare, framing, setup};
 use cao::renderer::{COLOUR, Renderer};
-use cao_gpu::Gpu;
+use cao_gpu::{Format, Gpu};
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
-use cao_model::settings::Support;
+use cao_model::occlusion::Occlusion;
+use cao_model::settings::{Setup, Support};
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
 use cao_model::view::View;
@@ -28,7 +29,21 @@ fn renderer(
     features: &Features,
     clips: &[Clip],
 ) -> Renderer {
-    let mut renderer = Renderer::new(gpu, volume, transfer.clone(), setup(MAPS), COLOUR).unwrap();
+    renderer_by(Method::Cao, gpu, volume, transfer, features, clips)
+}
+
+fn renderer_by(
+    method: Method,
+    gpu: &Gpu,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    features: &Features,
+    clips: &[Clip],
+) -> Renderer {
+    let base = setup(MAPS);
+    let occlusion = Occlusion { quadrature: method.quadrature(), ..base.occlusion };
+    let setup = Setup { method, occlusion, ..base };
+    let mut renderer = Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR).unwrap();
     renderer.set_clips(clips).unwrap();
     renderer.set_features(features.clone()).unwrap();
     renderer.update(&mut |_| ()).unwrap();
@@ -60,10 +75,25 @@ fn twin(
     };
     let fields: Vec<_> =
         clips.iter().map(|clip| ClipField::new(clip, &grid, reach, &maps).unwrap()).collect();
+    let ambient = renderer.ambient().fields().ambient;
+    let channels = (ambient.desc().format == Format::Rgba16Unorm).then(|| {
+        let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read_image(renderer.gpu(), ambient));
+        let least = |texel: &[u16; 4]| *texel.iter().min().unwrap();
+        std::array::from_fn(|c| {
+            let of = |texel: &[u16; 4]| f32::from(if c < 4 { texel[c] } else { least(texel) }) / 65535.0;
+            texels.iter().map(of).collect()
+        })
+    });
     let frame = twin::draw::raycast::Frame {
         grid,
         values: &opacity,
-        parts: Some(Parts { features, index: &index, values: &values, spared: &left }),
+        parts: Some(Parts {
+            features,
+            index: &index,
+            values: &values,
+            spared: &left,
+            channels: channels.as_ref(),
+        }),
         transfer: &TransferFunction { opacity: identity().opacity, ..transfer.clone() },
         reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
         ambient: &renderer.read_ambient().unwrap(),
@@ -115,10 +145,17 @@ fn pictures_of_features_are_those_of_the_twin() {
         let list = list.into_iter().chain([third]).collect();
         Features::by_labels(list, volume.dims, (0..grid.len()).map(of).collect()).unwrap()
     };
-    for (n, (features, clips)) in
-        [(layers(), vec![]), (layers(), vec![ball.clone()]), (labels, vec![ball, slab])].iter().enumerate()
+    for (n, (method, features, clips)) in [
+        (Method::Cao, layers(), vec![]),
+        (Method::Cao, layers(), vec![ball.clone()]),
+        (Method::Cao, labels, vec![ball.clone(), slab]),
+        // Which reads the factor of the feature that it shows.
+        (Method::FeatureDriven, layers(), vec![ball]),
+    ]
+    .iter()
+    .enumerate()
     {
-        let renderer = renderer(&gpu, &volume, &transfer, features, clips);
+        let renderer = renderer_by(*method, &gpu, &volume, &transfer, features, clips);
         for turn in 0..2 {
             let look = Look {
                 step_mm: Some([0.5, 0.35][turn]),
@@ -172,21 +209,21 @@ fn where_two_features_meet_there_is_no_shell_of_a_third() {
 #[test]
 fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_is_near_it() {
     let gpu = open();
-    let volume = builtin_box("fruit", [64, 60, 56], [1.0; 3]).unwrap();
+    let volume = builtin_box("fruit", [48, 44, 48], [1.0; 3]).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let state = |renderer: &Renderer| (renderer.read_opacity().unwrap(), renderer.read_ambient().unwrap());
     for method in methods() {
         let quadrature = method.quadrature();
         let base = setup(MAPS);
-        let occlusion = cao_model::occlusion::Occlusion { quadrature, rays: method.rays(), ..base.occlusion };
-        let setup = cao_model::settings::Setup { method, occlusion, ..base };
+        let occlusion = Occlusion { quadrature, rays: method.rays(), ..base.occlusion };
+        let setup = Setup { method, occlusion, ..base };
         let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let before = state(&renderer);
         let grid = grid_of(&volume);
         let core = |i: usize| {
             let p = grid.to_world(grid.voxel(i).map(|c| c as f64));
-            u8::from(p.iter().map(|c| c * c).sum::<f64>() < 144.0)
+            u8::from(p.iter().map(|c| c * c).sum::<f64>() < 36.0)
         };
         let labels = (0..grid.len()).map(core).collect();
         let mut features = Features::by_labels(vec![Feature::new("core")], volume.dims, labels).unwrap();
@@ -202,7 +239,7 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let hidden = state(&renderer);
         assert!(hidden.0 != before.0 && hidden.1 != before.1, "{}", method.name());
         if method.entry().contextual && method.values() == method {
-            // A ball of 12 mm and what is within 6 mm of it, in whole bricks, of a volume of 60 mm.
+            // A ball of 6 mm and what is within 6 mm of it, in whole bricks, of a volume of 48 mm.
             let found = renderer.categories().unwrap();
             let computed = found.affected as f64 / volume.len() as f64;
             assert!(computed > 0.02 && computed < 0.5, "{}: {computed}", method.name());

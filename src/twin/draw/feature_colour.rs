@@ -23,16 +23,12 @@ pub struct Parts<'a> {
     pub values: &'a [f32],
     /// Opacities that clips leave, 0 in all other voxels.
     pub spared: &'a [f32],
+    /// Ambient factors of features side by side, and the least of them, which counts where there is none; where they are not all the same.
+    pub channels: Option<&'a [Vec<f32>; 5]>,
 }
 
-/// Linear red, green and blue at index coordinates, of voxels with these opacities.
-pub fn colour_at(
-    grid: &Grid,
-    parts: &Parts,
-    opacity: &[f32],
-    transfer: &TransferFunction,
-    position: [f64; 3],
-) -> DVec3 {
+/// The number of the feature at index coordinates, of voxels with these opacities.
+pub fn owner_at(grid: &Grid, parts: &Parts, opacity: &[f32], position: [f64; 3]) -> usize {
     let voxels = around(grid, position);
     let share = |k: usize| -> f64 {
         let own = voxels.iter().filter(|(i, _)| usize::from(parts.index[*i]) == k);
@@ -44,6 +40,19 @@ pub fn colour_at(
             (own, most) = (k, share(k));
         }
     }
+    own
+}
+
+/// Linear red, green and blue at index coordinates, of voxels with these opacities.
+pub fn colour_at(
+    grid: &Grid,
+    parts: &Parts,
+    opacity: &[f32],
+    transfer: &TransferFunction,
+    position: [f64; 3],
+) -> DVec3 {
+    let voxels = around(grid, position);
+    let own = owner_at(grid, parts, opacity, position);
     let colour = own.checked_sub(1).and_then(|k| parts.features.list[k].colour);
     let colour = colour.unwrap_or_else(|| {
         let of = |what: &dyn Fn(usize) -> f64| -> f64 {
@@ -83,7 +92,13 @@ mod tests {
                 .unwrap();
         let list = vec![Feature::new("a"), Feature { colour: Some([0.0, 0.0, 1.0]), ..Feature::new("b") }];
         let features = Features::by_labels(list, grid.dims, vec![1, 2]).unwrap();
-        let parts = Parts { features: &features, index: &[1, 2], values: &[10.0, 0.0], spared: &[0.0, 0.0] };
+        let parts = Parts {
+            features: &features,
+            index: &[1, 2],
+            values: &[10.0, 0.0],
+            spared: &[0.0, 0.0],
+            channels: None,
+        };
         let at = |opacity: [f32; 2], x| colour_at(&grid, &parts, &opacity, &transfer, [x, 0.0, 0.0]);
         // Not the colour of the value between, 6, which is half as bright.
         assert_eq!(at([0.5, 0.5], 0.4), DVec3::new(1.0, 1.0, 0.0));

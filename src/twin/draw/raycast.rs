@@ -14,7 +14,7 @@
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::air::{air_of, ambient_at};
-use crate::draw::feature_colour::{Parts, colour_at};
+use crate::draw::feature_colour::{Parts, colour_at, owner_at};
 use crate::draw::segment::{Segment, segment, varies};
 use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
@@ -22,7 +22,7 @@ use cao_kernels::raycast as kernel;
 use cao_model::look::Look;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A ray ends when what remains cannot change an 8-bit sRGB pixel by more than this many levels.
 pub const TOLERANCE: f64 = 0.5;
@@ -68,7 +68,16 @@ pub struct Image {
 /// Draws `size` = [width, height] pixels: the mean of the look's samples, each the picture of a field of view that is shifted by its
 /// place in the pixel, and the depth of the first.
 pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
-    let ambient = |position| ambient_at(&frame.grid, frame.ambient, position);
+    let ambient = |position| {
+        let channels = frame.parts.and_then(|parts| Some((parts, parts.channels?)));
+        let values = channels.map_or(frame.ambient, |(parts, channels)| {
+            let place = Vec3::from_array(frame.grid.to_world(position).map(|c| c as f32));
+            let voxels = if visible(frame.clips, place) { frame.values } else { parts.spared };
+            let feature = owner_at(&frame.grid, &parts, voxels, position);
+            &channels[feature.checked_sub(1).map_or(4, |channel| channel % 4)]
+        });
+        ambient_at(&frame.grid, values, position)
+    };
     let views: Vec<View> = frame.look.offsets().into_iter().map(|at| shifted(view, size, at)).collect();
     let mean = |i| {
         let samples = views.iter().map(|view| pixel(frame, view, size, i, &mut { ambient }));

@@ -213,7 +213,7 @@ mod tests {
         for i in 0..grid.len() {
             for (k, (r, t)) in shells.into_iter().enumerate() {
                 if (from_middle(&grid, i) - r).abs() < 0.5 * WIDTH {
-                    opacity[i] = (65535.0 * (1.0 - (-t / WIDTH as f64).exp())).round() as u16;
+                    opacity[i] = (65535.0 * (1.0 - (-t / WIDTH).exp())).round() as u16;
                     labels[i] = k as u8 + 1;
                 }
             }
