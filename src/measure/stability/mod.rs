@@ -9,6 +9,7 @@ pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
+pub mod mip_blocks;
 pub mod motion;
 pub mod numbers;
 pub mod page;
@@ -16,7 +17,9 @@ pub mod pixels;
 mod plane_cut;
 pub mod radius;
 pub mod sheets;
+pub mod stacked_layers;
 pub mod stereo;
+pub mod thin_sheets;
 pub mod views;
 
 use crate::Result;
@@ -178,7 +181,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 11] = [
+pub const TRIALS: [Trial; 14] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -233,6 +236,21 @@ pub const TRIALS: [Trial; 11] = [
         name: "views",
         title: "Do odd eyes see holes, or each another picture?",
         run: |gpu, effort, progress| views::run(gpu, &views::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "stacked-layers",
+        title: "Do sheets that no light reaches darken what lies in front of the first?",
+        run: |_, effort, progress| stacked_layers::run(&stacked_layers::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "mip-blocks",
+        title: "Does a wall change its shading as it moves by whole voxels?",
+        run: |_, effort, progress| mip_blocks::run(&mip_blocks::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "thin-sheets",
+        title: "How much light comes through thin sheets far away?",
+        run: |_, effort, progress| thin_sheets::run(&thin_sheets::Plan::of(effort), progress),
     },
 ];
 
