@@ -249,7 +249,7 @@ pub const TRIALS: [Trial; 14] = [
     },
     Trial {
         name: "thin-sheets",
-        title: "How much light comes through thin sheets far away?",
+        title: "How wrong are cones about sheets that are thinner than they are wide?",
         run: |_, effort, progress| thin_sheets::run(&thin_sheets::Plan::of(effort), progress),
     },
 ];
