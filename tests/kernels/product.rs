@@ -33,6 +33,7 @@ impl State {
     }
 
     /// V_AO of every voxel, the bricks in this order.
+    #[expect(clippy::too_many_arguments, reason = "what is computed of what, each named once")]
     fn computed(
         &self,
         grid: &Grid,

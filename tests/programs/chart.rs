@@ -364,6 +364,7 @@ fn the_report_stands_alone_and_has_every_part(chart: &Chart) {
         "Clustered histograms",
         "16.13",
         "272.846",
+        "332.14",
         "a machine",
         "cao chart -o &lt;x&gt;",
     ] {

@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, motion,
-    noise, numbers, pixels, radius, sheets, shells, stereo, tables, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, mip_blocks,
+    motion, noise, numbers, pixels, radius, sheets, shells, stacked_layers, stereo, tables, thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -277,4 +277,44 @@ fn an_opaque_sheet_is_nearly_nothing_to_a_histogram() {
     assert_shown(&finding);
     let histograms = curve(&finding, 0, "local histograms");
     assert!(histograms.at(12.0) < 0.5 * histograms.at(3.0), "{}", finding.sentence);
+}
+
+/// Computed in float64 outside of this program, to three digits.
+#[test]
+fn layers_that_no_light_reaches_darken_spao_and_nothing_else() {
+    let plan = stacked_layers::Plan { sheets: vec![1, 2, 4, 8], directions: 300 };
+    let finding = stacked_layers::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let spao = curve(&finding, 0, "SPAO");
+    for (sheets, expected) in [(1.0, 0.691), (2.0, 0.576), (4.0, 0.475), (8.0, 0.408)] {
+        assert!((spao.at(sheets) - expected).abs() < 1e-3, "{sheets}: {}", spao.at(sheets));
+    }
+    let one = stacked_layers::Plan { sheets: vec![1], ..plan };
+    assert!(!stacked_layers::run(&one, &mut |_| ()).unwrap().control_fails, "one sheet shows nothing");
+}
+
+#[test]
+fn mip_levels_make_blocks_of_a_wall_and_cubes_around_voxels_none() {
+    let finding = mip_blocks::run(&mip_blocks::Plan { positions: (0..16).collect() }, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let least = |series: &Series| series.points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
+    let mip = curve(&finding, 0, "SPAO, mip");
+    assert!(
+        (least(mip) - 0.234).abs() < 1e-3 && (mip.largest() - 0.638).abs() < 1e-3,
+        "{}",
+        finding.sentence
+    );
+    let nbuffer = curve(&finding, 0, "SPAO, N-buffers");
+    assert!((least(nbuffer) - 0.6375).abs() < 1e-4 && (nbuffer.largest() - 0.6375).abs() < 1e-4);
+    let still = mip_blocks::Plan { positions: vec![3] };
+    assert!(!mip_blocks::run(&still, &mut |_| ()).unwrap().control_fails, "a wall that stands shows nothing");
+}
+
+#[test]
+fn cones_are_wrong_about_thin_sheets_on_either_side() {
+    let plan = thin_sheets::Plan { distances: vec![1, 6, 11, 12], directions: 300 };
+    let finding = thin_sheets::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let cones = curve(&finding, 0, "cones, 26w");
+    assert!(cones.at(11.0) < -0.4 && cones.at(12.0) > 0.4, "{}", finding.sentence);
 }

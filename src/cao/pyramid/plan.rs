@@ -84,8 +84,8 @@ impl Plan {
         // From the last: a level holds what is looked up in it and what the next is made of, as far as that is not 0.
         for l in (1..cells.len()).rev() {
             let coarser = cells.get(l + 1).copied();
-            for i in 0..3 {
-                let [low, high] = stored(cells[l], coarser, i, dims[i], factor);
+            for (i, &voxels) in dims.iter().enumerate() {
+                let [low, high] = stored(cells[l], coarser, i, voxels, factor);
                 (cells[l].first[i], cells[l].dims[i]) = (low, (high - low + 1).max(1) as u32);
             }
         }

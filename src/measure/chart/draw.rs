@@ -316,7 +316,7 @@ mod tests {
     fn the_legend_stays_on_the_sheet_and_above_the_caption() {
         let methods: Vec<&str> = ["solid colour", "image space", "LAO (unit)", "CAO literal", "CAO", "rays"]
             .into_iter()
-            .chain(cao_model::METHODS.iter().map(|entry| entry.name))
+            .chain(cao_model::METHODS.iter().flat_map(|entry| [entry.name, entry.title]))
             .collect();
         let height = legend_height(&methods);
         // As one row each they would leave it.

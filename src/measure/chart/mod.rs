@@ -237,8 +237,8 @@ fn is_baseline(method: &str, setting: &Setting) -> bool {
 
 /// Device memory that contenders may take at a time; where they need more, they compete in groups, the baseline in each.
 const MEMORY: usize = 1 << 30;
-/// Bytes a voxel of one contender (`Volumes`, the volume, and a little).
-const VOXEL: usize = 24;
+/// Bytes a voxel of one contender (`Volumes`, the volume, and a little; five levels of N-buffers in a volume of 48³ take 17).
+const VOXEL: usize = 28;
 
 /// How many compete with the baseline at a time.
 fn group(scene: &Scene) -> usize {

@@ -70,6 +70,11 @@ pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) 
         "As the paper's Fig. 9: median times of the stages of a frame in which the clip moved, both eyes.",
     );
     body += &inline(&tables::figure_9(chart));
+    body += &section(
+        "What volumes of means take",
+        "Table 1.1 of Smooth Probabilistic Ambient Occlusion, and ours.",
+    );
+    body += &tables::spao(chart);
     if let Some(peers) = peers {
         body += &section("Peers in the same run", "What tools/peers measured beside this program.");
         body += &tables::peers(peers);

@@ -3,12 +3,14 @@
 use super::draw::{self, Mark, with_spread};
 use super::looks::{self, ERRORS, Looks};
 use super::peers::Peers;
-use super::{BASELINE, Change, Chart, Point, SceneChart};
+use super::{BASELINE, Change, Chart, Point, Run, SceneChart, front};
 use crate::contender::{self, SOLID};
 use crate::plot::{Anchor, Drawing, INK, short, text_width};
 use crate::split::Split;
+use cao::stages;
 use cao_model::methods::Method;
 use cao_model::occlusion::Quadrature;
+use cao_model::options::{Levels, Options};
 use std::fmt::Write as _;
 
 /// CAO Table 1: author, name, quality, real-time modification to radius, transfer function, clipping.
@@ -34,6 +36,20 @@ const TABLE_3: [(&str, f64, [[f64; 2]; 4]); 3] = [
     ("Engine", 272.846, [[111.549, 184.902], [67.910, 155.245], [42.831, 126.378], [22.543, 85.363]]),
     ("Beetle", 128.288, [[15.497, 42.581], [7.509, 25.581], [4.192, 16.063], [2.012, 8.526]]),
     ("Skeleton", 95.142, [[4.316, 17.514], [2.020, 9.594], [1.107, 5.729], [0.529, 2.825]]),
+];
+
+/// SPAO Table 1.1, GeForce GTX Titan, 512³: level or part, ms by N-buffers and by mip levels.
+const TABLE_1_1: [(&str, [f64; 2]); 10] = [
+    ("level 0", [30.93, 33.00]),
+    ("level 1", [33.99, 4.58]),
+    ("level 2", [40.13, 0.66]),
+    ("level 3", [41.16, 0.17]),
+    ("level 4", [42.69, 0.14]),
+    ("level 5", [38.09, 0.13]),
+    ("level 6", [41.91, 0.12]),
+    ("levels", [268.90, 38.8]),
+    ("combination", [63.24, 110.39]),
+    ("all", [332.14, 149.19]),
 ];
 
 /// The paper's ray sets.
@@ -179,6 +195,64 @@ pub(super) fn table_3(chart: &Chart) -> String {
         1,
         &rows,
     )
+}
+
+/// SPAO Table 1.1: what its levels and their combination take, all new; ours beside.
+pub(super) fn spao(chart: &Chart) -> String {
+    // A share of all that N-buffers take.
+    let share = |ms: f64, of: f64| if ms > 0.0 { format!("{:.4}", ms / of) } else { "–".into() };
+    let mut html = String::new();
+    for scene in &chart.scenes {
+        let ours = [Levels::Nbuffer, Levels::Mip].map(|levels| {
+            let options = Options { levels, ..Options::DEFAULT };
+            let label = contender::label_of(Method::Spao, &options);
+            let own = |p: &&Point| p.change == Change::Volume && p.setting.label == label;
+            let point =
+                scene.points.iter().filter(|p| p.method == contender::name(Method::Spao)).find(own)?;
+            let of = |stage: &str| -> f64 {
+                let ms = |run: &Run| run.stages.iter().filter(|t| t.stage.name == stage).map(|t| t.ms).sum();
+                front::quartiles(point.runs.iter().map(ms))[1]
+            };
+            let levels: f64 = stages::LEVELS.iter().map(|stage| of(stage.name)).sum();
+            let product = of(stages::PRODUCT.name);
+            Some(move |part: &str| match part {
+                "levels" => levels,
+                "combination" => product,
+                "all" => levels + product,
+                level => of(level),
+            })
+        });
+        let [Some(nbuffer), Some(mip)] = ours else { continue };
+        let rows: Vec<Vec<String>> = TABLE_1_1
+            .iter()
+            .map(|(part, [printed, printed_mip])| {
+                let whole = TABLE_1_1[TABLE_1_1.len() - 1].1[0];
+                let mut row = vec![(*part).to_owned(), format!("{printed:.2}"), format!("{printed_mip:.2}")];
+                row.extend([share(*printed, whole), share(*printed_mip, whole)]);
+                row.extend([share(nbuffer(part), nbuffer("all")), share(mip(part), nbuffer("all"))]);
+                row
+            })
+            .collect();
+        let [x, y, z] = scene.dims;
+        let _ = writeln!(
+            html,
+            "<p>{}, {x} × {y} × {z}, all values new, shares of what N-buffers take in all ({} ms here). Our level 0 is the opacity itself, and \
+             our combination is of the voxels that show.</p>",
+            escaped(&scene.name),
+            short(nbuffer("all"))
+        );
+        let head = [
+            "",
+            "printed, N-buffers, ms",
+            "mip levels, ms",
+            "N-buffers",
+            "mip levels",
+            "ours, N-buffers",
+            "ours, mip levels",
+        ];
+        html += &table(&head, 1, &rows);
+    }
+    html
 }
 
 fn drawing(scene: &SceneChart, method: &str) -> f64 {

@@ -57,10 +57,16 @@ impl Listed {
         if half_sphere {
             setting.details += ", halved";
         }
-        for (option, value) in setup.options.other_than(&Options::DEFAULT) {
-            setting.label += &format!(" {option} {value}");
-        }
+        setting.label = with_options(setting.label, &setup.options);
         let work = self.ray * occlusion.rays.count().max(1) as f64;
         rendered::entrant(name, setup, setting, work, if half_sphere { HALF_SPHERE } else { 1.0 })
     }
+}
+
+/// A label, and which options are not as every method starts.
+pub fn with_options(mut label: String, options: &Options) -> String {
+    for (option, value) in options.other_than(&Options::DEFAULT) {
+        label += &format!(" {option} {value}");
+    }
+    label
 }

@@ -18,6 +18,7 @@ use cao_model::clip::Clip;
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
+use cao_model::options::Options;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::View;
 use cao_model::volume::Volume;
@@ -169,6 +170,11 @@ pub const BASELINE: &str = "LAO (unit)";
 pub fn name(method: Method) -> &'static str {
     let own = |kind: &&Kind| matches!(&kind.enters, Enters::As(listed) if listed.method == method);
     CONTENDERS.iter().find(own).map_or(method.name(), |kind| kind.name)
+}
+
+/// Label of a method without rays with these options.
+pub fn label_of(method: Method, options: &Options) -> String {
+    listed::with_options(method.quadrature().name().into(), options)
 }
 
 /// Every contender for such a scene.

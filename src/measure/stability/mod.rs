@@ -12,6 +12,7 @@ pub mod cut;
 pub mod dilation;
 pub mod labels;
 pub mod layers;
+pub mod mip_blocks;
 pub mod motion;
 pub mod noise;
 pub mod numbers;
@@ -22,8 +23,10 @@ mod progressive;
 pub mod radius;
 pub mod sheets;
 pub mod shells;
+pub mod stacked_layers;
 pub mod stereo;
 pub mod tables;
+pub mod thin_sheets;
 pub mod views;
 
 use crate::Result;
@@ -194,7 +197,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 17] = [
+pub const TRIALS: [Trial; 20] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -279,6 +282,21 @@ pub const TRIALS: [Trial; 17] = [
         name: "absorption",
         title: "Does an opaque sheet hide what lies behind it?",
         run: |_, effort, progress| absorption::run(&absorption::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "stacked-layers",
+        title: "Do sheets that no light reaches darken what lies in front of the first?",
+        run: |_, effort, progress| stacked_layers::run(&stacked_layers::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "mip-blocks",
+        title: "Does a wall change its shading as it moves by whole voxels?",
+        run: |_, effort, progress| mip_blocks::run(&mip_blocks::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "thin-sheets",
+        title: "How wrong are cones about sheets that are thinner than they are wide?",
+        run: |_, effort, progress| thin_sheets::run(&thin_sheets::Plan::of(effort), progress),
     },
 ];
 
