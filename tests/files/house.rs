@@ -313,14 +313,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
-    (
-        "src/cao/tables/",
-        &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"],
-    ),
-    (
-        "src/cao/histograms/",
-        &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"],
-    ),
+    ("src/cao/tables/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),
+    ("src/cao/histograms/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),
     ("src/cao/vicinity/", &["error", "stages", "drive", "field", "subject", "by_brick"]),
     (
         "src/cao/method.rs",

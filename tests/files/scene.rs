@@ -298,7 +298,10 @@ fn impossible_values_are_refused_by_name() {
         ("[occlusion]\nrays = 7", "occlusion.rays: \"7\" is no ray set"),
         ("[occlusion]\nrays = [26]", "occlusion.rays: "),
         ("[occlusion]\nquadrature = \"simpson\"", "occlusion.quadrature: \"simpson\" is no rule"),
-        ("[occlusion]\nmethod = \"ssao\"", "occlusion.method: \"ssao\": expected sat, shells, vicinity, histograms, lao, cao, rays"),
+        (
+            "[occlusion]\nmethod = \"ssao\"",
+            "occlusion.method: \"ssao\": expected sat, shells, vicinity, histograms, lao, cao, rays",
+        ),
         ("[occlusion]\nscope = \"some\"", "occlusion.scope: \"some\": expected needed or all"),
         ("[stereo]\nipd_mm = -1", "stereo.ipd_mm: -1: expected a length >= 0 mm"),
         ("[stereo]\nscreen_mm = 0", "stereo.screen_mm: 0: expected a length > 0 mm"),

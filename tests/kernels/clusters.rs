@@ -17,8 +17,7 @@ fn clusters_that_stay_empty_begin_anew_as_in_the_twin() {
     assert_eq!(plan.clusters, 24);
     let kinds: Vec<Vec<u32>> =
         (0..3).map(|_| (0..BINS).map(|_| random.below(32767 / u64::from(BINS)) as u32).collect()).collect();
-    let samples: Vec<Vec<u32>> =
-        (0..plan.rows).map(|_| kinds[random.below(3) as usize].clone()).collect();
+    let samples: Vec<Vec<u32>> = (0..plan.rows).map(|_| kinds[random.below(3) as usize].clone()).collect();
     let word = |w: u32, r: u32| {
         let sample = &samples[r as usize];
         sample[2 * w as usize] | sample[2 * w as usize + 1] << 16

@@ -59,17 +59,19 @@ fn values_equal_the_twins() {
     let mut random = Random::new(12);
     let (mut apart, mut count) = (0, 0);
     for grid in &GRIDS {
-        for (rays, radius, reference) in
-            [(RaySet::W26, 9.0, 1.0), (RaySet::Spiral(50), 20.0, 1.0), (RaySet::R6, 0.3, 1.0), (RaySet::Spiral(14), 6.0, 2.5)]
-        {
+        for (rays, radius, reference) in [
+            (RaySet::W26, 9.0, 1.0),
+            (RaySet::Spiral(50), 20.0, 1.0),
+            (RaySet::R6, 0.3, 1.0),
+            (RaySet::Spiral(14), 6.0, 2.5),
+        ] {
             // Few levels, so that many are equal and some differ by just the threshold.
             let opacity: Vec<u16> =
                 (0..grid.len()).map(|_| (random.below(12) as u16).saturating_sub(4) * 257).collect();
             let occlusion = settings(rays, radius * grid.min_spacing());
             let reference_mm = reference * grid.min_spacing() as f32;
             let scope = if random.below(2) == 0 { Scope::Needed } else { Scope::All };
-            let found =
-                computed(grid, &opacity, &occlusion, reference_mm, scope, |n| (0..n).rev().collect());
+            let found = computed(grid, &opacity, &occlusion, reference_mm, scope, |n| (0..n).rev().collect());
             let expected = vicinity(grid, &opacity, &occlusion, reference_mm, scope == Scope::All);
             for (i, (f, e)) in found.iter().zip(&expected).enumerate() {
                 let error = (f64::from(*f) / 65535.0 - e).abs();
@@ -100,5 +102,6 @@ fn known_answers() {
     assert_eq!(of(&|[_, _, z]| if z < 8 { 65535 } else { 0 }, [20, 20, 7]), 1.0);
     let corner = |[x, _, z]: [usize; 3]| if x >= 22 { 65535 } else { u16::from(z < 8) * 32768 };
     let value = of(&corner, [20, 20, 7]);
-    assert!((value - 0.5).abs() < 0.03, "{value}");
+    // Half a hemisphere, and what of the other half does not reach the wall within the radius: the twin's test has it.
+    assert!((value - 0.548).abs() < 0.02, "{value}");
 }

@@ -4,7 +4,8 @@
 use crate::support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 
-const METHODS: [&str; 9] = ["solid", "sat", "shells", "vicinity", "histograms", "lao", "cao", "cao-literal", "rays"];
+const METHODS: [&str; 9] =
+    ["solid", "sat", "shells", "vicinity", "histograms", "lao", "cao", "cao-literal", "rays"];
 
 /// The smallest run that has percentiles and runs to compare.
 const TINY: &str = "builtin:engine:16 --radius-mm 3 --rays 6 --size 32x24 --frames 3 --runs 2 --warm-up 1";

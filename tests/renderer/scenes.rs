@@ -137,8 +137,7 @@ impl Scene {
             6 if random.below(4) == 0 => {
                 let others: Vec<_> = methods().filter(|method| *method != self.setup.method).collect();
                 let method = others[pick(random, others.len())];
-                let (rays, quadrature) =
-                    (method.rays_like(self.setup.occlusion.rays), method.quadrature());
+                let (rays, quadrature) = (method.rays_like(self.setup.occlusion.rays), method.quadrature());
                 let other = Setup {
                     method,
                     occlusion: Occlusion { rays, quadrature, ..self.setup.occlusion },

@@ -2,8 +2,8 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, motion, noise, numbers, pixels,
-    radius, sheets, shells, stereo, tables, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, motion, noise, numbers,
+    pixels, radius, sheets, shells, stereo, tables, views,
 };
 use cao_testing::{close, open};
 
@@ -208,7 +208,11 @@ fn more_shells_make_a_wall_darker_than_it_is() {
     let finding = shells::run(&plan, &mut |_| ()).unwrap();
     assert_shown(&finding);
     // What was computed for a radius of 16 voxels, 0.218, is no other at 32.
-    assert!((curve(&finding, 0, "the ambient integral").at(1.0) - 0.218).abs() < 0.03, "{}", finding.sentence);
+    assert!(
+        (curve(&finding, 0, "the ambient integral").at(1.0) - 0.218).abs() < 0.03,
+        "{}",
+        finding.sentence
+    );
 }
 
 #[test]

@@ -47,7 +47,8 @@ impl Clustered {
     /// Whether the clusters are of something else.
     fn outdated(&self, on: &Subject, changed: Changed) -> bool {
         let held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
-        changed == Changed::ALL || !matches!(&*held, Some((of, plan)) if *of == on.values && *plan == self.plan)
+        changed == Changed::ALL
+            || !matches!(&*held, Some((of, plan)) if *of == on.values && *plan == self.plan)
     }
 }
 

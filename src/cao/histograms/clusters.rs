@@ -62,9 +62,19 @@ impl Clusters {
         let params = params(plan, round);
         let push = bytemuck::bytes_of(&params);
         let (labels, sums, centres) = (&self.labels, &self.sums, &self.centres);
-        rec.dispatch(&self.label, &kernel::LabelBindings { sampled, labels, centres }, push, over(plan.rows))?;
+        rec.dispatch(
+            &self.label,
+            &kernel::LabelBindings { sampled, labels, centres },
+            push,
+            over(plan.rows),
+        )?;
         rec.barrier(&BOTH, &BOTH);
-        rec.dispatch(&self.collect, &kernel::CollectBindings { sampled, labels, sums }, push, over(plan.rows))?;
+        rec.dispatch(
+            &self.collect,
+            &kernel::CollectBindings { sampled, labels, sums },
+            push,
+            over(plan.rows),
+        )?;
         rec.barrier(&BOTH, &BOTH);
         let binds = kernel::CentreBindings { sampled, sums, centres };
         rec.dispatch(&self.centre, &binds, push, over(plan.clusters))?;

@@ -5,10 +5,12 @@
 //! voxels, or one of every 2³, the number of the nearest cluster (3D r16uint). Cost: a read of a bin for each voxel of each neighbourhood,
 //! 7,152 at a radius of 12, and 64 differences for each cluster.
 
-use crate::field::Field;
+use crate::field::{Field, ratios};
 use crate::host::{row_of_groups, rows_over};
 use cao_gpu::Result;
-use cao_gpu::{Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline, Recorder};
+use cao_gpu::{
+    Access, Buffer, BufferUse, Format, Gpu, Image, ImageDesc, ImageKind, ImageUse, Pipeline, Recorder,
+};
 use cao_kernels::histogram as kernel;
 
 /// Largest neighbourhood in smallest spacings; larger ones cost their cube.
@@ -44,14 +46,14 @@ impl HistogramPlan {
     pub fn new(dims: [u32; 3], spacing: [f32; 3], radius_mm: f32, clusters: u32, block: u32) -> Self {
         let smallest = f64::from(spacing.into_iter().fold(f32::INFINITY, f32::min));
         let radius = (f64::from(radius_mm) / smallest).min(MOST_VOXELS);
-        let edge = radius.floor() as i32;
+        // Rounding of lengths in mm must not lose a voxel.
+        let (edge, ratios) = ((radius * (1.0 + 1e-5)).floor() as i32, ratios(spacing));
         let mut offsets = Vec::new();
         for z in -edge..=edge {
             for y in -edge..=edge {
                 for x in -edge..=edge {
-                    let of = |c: i32, i: usize| (f64::from(c) * f64::from(spacing[i]) / smallest).powi(2);
+                    let of = |c: i32, i: usize| (f64::from(c) * ratios[i]).powi(2);
                     let squared = of(x, 0) + of(y, 1) + of(z, 2);
-                    // Rounding of lengths in mm must not lose one.
                     if squared > 0.0 && squared <= radius * radius * (1.0 + 1e-5) {
                         let place = [x, y, z].map(|c| (c + 128) as u32);
                         offsets.push(kernel::Offset {

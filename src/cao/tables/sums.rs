@@ -99,7 +99,9 @@ mod tests {
     /// Of the largest boxes that have them, and that no sum of theirs wraps around.
     #[test]
     fn bits_are_as_many_as_boxes_leave() {
-        for (half, bits) in [(0_u64, 16), (19, 16), (20, 15), (32, 13), (50, 12), (64, 10), (100, 9), (127, 8)] {
+        for (half, bits) in
+            [(0_u64, 16), (19, 16), (20, 15), (32, 13), (50, 12), (64, 10), (100, 9), (127, 8)]
+        {
             let voxels = (2 * half + 1).pow(3);
             let counted = Counted::of(voxels, false).unwrap();
             assert_eq!(counted.bits, bits, "{half}");

@@ -191,8 +191,11 @@ mod tests {
         let rule = Some(Quadrature::Left);
         let (found, left_out) = methods(Some(Verified::All), rule);
         assert!(found.iter().all(|method| method.has(Quadrature::Left)));
-        let without: Vec<_> =
-            METHODS.iter().filter(|entry| !entry.method.has(Quadrature::Left)).map(|entry| entry.name).collect();
+        let without: Vec<_> = METHODS
+            .iter()
+            .filter(|entry| !entry.method.has(Quadrature::Left))
+            .map(|entry| entry.name)
+            .collect();
         assert!(without.contains(&"rays") && found.len() == METHODS.len() - without.len());
         assert_eq!(left_out, without);
         // By the renderer.

@@ -88,7 +88,10 @@ mod tests {
     #[test]
     fn names_stay_and_every_method_is_there() {
         let names: Vec<_> = Way::all().into_iter().map(Way::name).collect();
-        assert_eq!(names, ["solid", "sat", "shells", "vicinity", "histograms", "lao", "cao", "cao-literal", "rays"]);
+        assert_eq!(
+            names,
+            ["solid", "sat", "shells", "vicinity", "histograms", "lao", "cao", "cao-literal", "rays"]
+        );
         for way in Way::all() {
             assert_eq!(Way::parse(way.name()), Ok(way));
         }

@@ -11,8 +11,8 @@ use cao_model::occlusion::Quadrature;
 /// Colours that stay apart for the colour-blind (Okabe and Ito 2008), in the order of the methods after "solid colour".
 /// Further ones are between them, or darker.
 const COLOURS: [&str; 12] = [
-    "#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73", "#56b4e9", "#8f6f1b", "#7a3b8f", "#a3c130",
-    "#7b1e1e", "#2f4f8f",
+    "#cc79a7", "#222222", "#0072b2", "#e69f00", "#d55e00", "#009e73", "#56b4e9", "#8f6f1b", "#7a3b8f",
+    "#a3c130", "#7b1e1e", "#2f4f8f",
 ];
 pub(super) const GREY: &str = "#777777";
 pub(super) const FRONT: &str = "#aaaaaa";

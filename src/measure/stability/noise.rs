@@ -64,14 +64,12 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let values = |sigma: f64| -> [Vec<f64>; 2] {
         let opacity = opacity(sigma);
         let rays = rays(&grid, &opacity, &traced, 1.0, true);
-        [
-            rays.iter().map(|a| f64::from(*a) / 65535.0).collect(),
-            vicinity(&grid, &opacity, &lines, 1.0, true),
-        ]
+        [rays.iter().map(|a| f64::from(*a) / 65535.0).collect(), vicinity(&grid, &opacity, &lines, 1.0, true)]
     };
     let clean = values(0.0);
     // Where the volume without noise has opacity.
-    let solid: Vec<usize> = opacity(0.0).iter().enumerate().filter(|(_, a)| **a > 0).map(|(i, _)| i).collect();
+    let solid: Vec<usize> =
+        opacity(0.0).iter().enumerate().filter(|(_, a)| **a > 0).map(|(i, _)| i).collect();
     let mut curves = [Vec::new(), Vec::new()];
     for (n, &sigma) in plan.sigmas.iter().enumerate() {
         for ((curve, clean), noisy) in curves.iter_mut().zip(&clean).zip(values(sigma)) {

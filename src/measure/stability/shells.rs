@@ -41,12 +41,8 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let opacity: Vec<f32> =
         (0..grid.len()).map(|i| f32::from(u8::from(grid.voxel(i)[2] <= RADIUS))).collect();
     let at = [RADIUS; 3];
-    let occlusion = |rays, quadrature| Occlusion {
-        rays,
-        quadrature,
-        radius_mm: RADIUS as f32,
-        ..Occlusion::paper(1.0)
-    };
+    let occlusion =
+        |rays, quadrature| Occlusion { rays, quadrature, radius_mm: RADIUS as f32, ..Occlusion::paper(1.0) };
     let level = |value: f64| plan.shells.iter().map(|n| [f64::from(*n), value]).collect::<Vec<_>>();
     let integral = Integral::ambient(RADIUS as f64, 0.5, 8, plan.directions, 1.0);
     let truth = reference(&grid, &opacity, &integral, 1.0, &[at.map(|c| c as f64)])[0];
@@ -81,7 +77,10 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
         ours: Ours::holding((rays - truth).abs() < 0.05),
         control_fails: mean.points.windows(2).all(|pair| pair[1][1] < pair[0][1])
             && (last[1] - truth).abs() > 2.0 * (rays - truth).abs(),
-        setting: format!("opaque half-space, radius {RADIUS} voxels, {} directions of the truth", plan.directions),
+        setting: format!(
+            "opaque half-space, radius {RADIUS} voxels, {} directions of the truth",
+            plan.directions
+        ),
         charts: vec![Chart {
             title: "Ambient factor of a flat wall".into(),
             x: Quantity::log("shells"),

@@ -77,7 +77,8 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     for (n, &radius) in plan.radii.iter().enumerate() {
         let (size, mut random) = (2 * radius + 1, Random::new(radius as u64));
         let voxels = (size as u64).pow(3);
-        let counted = Counted::of(voxels, false).ok_or_else(|| crate::Error::refused("radius", "too large"))?;
+        let counted =
+            Counted::of(voxels, false).ok_or_else(|| crate::Error::refused("radius", "too large"))?;
         if held.as_ref().is_none_or(|(bits, _)| *bits != counted.bits) {
             let one = (OPACITY * f64::from(counted.levels())).round() as u32;
             held = Some((counted.bits, table(&grid, 0, one, u32::wrapping_add)));
@@ -120,7 +121,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             super::tiny(numbers.largest()),
         ),
         ours: Ours::holding(numbers.largest() < 0.5 * LEVEL),
-        control_fails: floats.largest() > LEVEL,
+        control_fails: largest > LEVEL,
         setting: format!(
             "even opacity {OPACITY}, {}³ voxels, {} boxes of each radius in the upper half of each axis",
             plan.edge, plan.boxes
