@@ -19,8 +19,8 @@ pub const MOST_VOXELS: f64 = 12.0;
 pub const MOST_FINE: u64 = 1 << 24;
 /// Fewest voxels that there have to be for each cluster: fewer are no compression.
 pub const VOXELS_A_CLUSTER: u64 = 256;
-/// Samples that a cluster is the mean of, where all are as large: 100,000 of the default's.
-const ROWS_A_CLUSTER: u32 = 98;
+/// Samples that a cluster is the mean of, where all are as large: 32,768 of the default's.
+const ROWS_A_CLUSTER: u32 = 32;
 /// Steps of a slab of `assign`, so that no submission takes long.
 const SLAB: f64 = 4e9;
 
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn the_largest_neighbourhood_has_the_voxels_and_weights_of_a_ball() {
         let plan = HistogramPlan::new([128; 3], [0.5; 3], 20.0, 1024, 1);
-        assert_eq!((plan.neighbours(), plan.clusters, plan.rows), (7152, 1024, 100_352));
+        assert_eq!((plan.neighbours(), plan.clusters, plan.rows), (7152, 1024, 32_768));
         let sum: f64 = plan.offsets.iter().map(|offset| f64::from(offset.weight) / 65536.0).sum();
         assert!((sum - 141.29).abs() < 0.01, "{sum}");
         assert!(plan.neighbours() < kernel::MOST_OFFSETS as usize);
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn small_volumes_have_few_clusters_and_slabs_cover_all() {
         let plan = HistogramPlan::new([20; 3], [1.0; 3], 4.0, 1024, 1);
-        assert_eq!((plan.clusters, plan.rows, plan.stride), (31, 3038, 2));
+        assert_eq!((plan.clusters, plan.rows, plan.stride), (31, 992, 8));
         assert_eq!(HistogramPlan::new([3, 2, 1], [1.0; 3], 4.0, 1024, 1).clusters, 1);
         let large = HistogramPlan::new([257; 3], [1.0; 3], 12.0, 1024, 2);
         assert_eq!(large.coarse, [129; 3]);
