@@ -17,7 +17,8 @@ use cao_model::view::StereoRig;
 use cao_testing::{close, open};
 use std::collections::BTreeMap;
 
-const METHODS: [&str; 11] = [
+/// Those of a first look: without `histograms`.
+const METHODS: [&str; 10] = [
     "solid colour",
     "image space",
     BASELINE,
@@ -28,7 +29,6 @@ const METHODS: [&str; 11] = [
     "SAT",
     "shells",
     "vicinity",
-    "histograms",
 ];
 const RUNS: u32 = 2;
 
