@@ -97,7 +97,7 @@ static CONTENDERS: [Kind; 11] = [
             computes: "12 voxels at most, as if nothing were clipped; new values cluster anew",
             // A hundred rays of every voxel, where values or radius are new.
             ray: 100.0,
-            // Not for a first look: on a software driver its clusters take longer than all the rest.
+            // Not for a first look, which is to take less than two minutes on a software driver.
             few: &[],
             halved: false,
         }),
