@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let times = renderer.update(&mut |_| ())?;
         let (difference, full) = verify(&renderer, &mut |_| ())?;
         println!(
-            "{:<6} {} ({}), rays {}, rule {}: {:.1} ms, in full {:.1} ms, {} of {} voxels differ",
+            "{:<10} {} ({}), rays {}, rule {}: {:.1} ms, in full {:.1} ms, {} of {} voxels differ",
             method.name,
             method.title,
             method.source,

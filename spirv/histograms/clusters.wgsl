@@ -26,7 +26,7 @@ var<immediate> params: ClustersParams;
 // Numbers of a cluster in `Sums`.
 const SUMS = BINS + 1u;
 // Most samples.
-const MOST_ROWS = 100352u;
+const MOST_ROWS = 131072u;
 
 // The first sample of a part, and how many it has.
 fn part_of(cluster: u32) -> vec2<u32> {

@@ -66,7 +66,8 @@ fn normal_at(voxel: vec3<i32>) -> vec3<f32> {
 fn threshold(voxel: vec3<i32>) -> f32 {
     let own = parts_at(voxel);
     if params.exponent == 1.0 {
-        return own + MORE * PARTS;
+        // Half a part more: texels are whole numbers of parts but for rounding.
+        return own + round(MORE * PARTS) + 0.5;
     }
     // 1 - a of a smallest spacing, and back.
     let clear = pow(max(1.0 - own / PARTS, OPAQUE), params.exponent) - MORE;

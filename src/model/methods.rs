@@ -114,7 +114,7 @@ pub static METHODS: &[Entry] = &[
         quadratures: &[Quadrature::Histogram],
         sets: &[RaySet::None],
         options: &["clusters"],
-        variants: &[&[], &[("clusters", "256")], &[("clusters", "4096")]],
+        variants: &[&[]],
         contextual: true,
         same_values_as: Method::Histograms,
     },

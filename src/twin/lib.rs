@@ -55,6 +55,13 @@ impl Grid {
         self.spacing.into_iter().fold(f64::INFINITY, f64::min)
     }
 
+    /// Spacings in smallest spacings, as f32 has them, rounded to 65536ths.
+    pub fn ratios(&self) -> [f64; 3] {
+        let spacing = self.spacing.map(|s| f64::from(s as f32));
+        let smallest = spacing.into_iter().fold(f64::INFINITY, f64::min);
+        spacing.map(|s| (65536.0 * s / smallest).round() / 65536.0)
+    }
+
     /// |spacing|, the diagonal of a voxel in mm.
     pub fn diagonal(&self) -> f64 {
         self.spacing.iter().map(|s| s * s).sum::<f64>().sqrt()

@@ -102,5 +102,6 @@ fn known_answers() {
     assert_eq!(of(&|[_, _, z]| if z < 8 { 65535 } else { 0 }, [20, 20, 7]), 1.0);
     let corner = |[x, _, z]: [usize; 3]| if x >= 22 { 65535 } else { u16::from(z < 8) * 32768 };
     let value = of(&corner, [20, 20, 7]);
-    assert!((value - 0.5).abs() < 0.03, "{value}");
+    // Half a hemisphere, and what of the other half does not reach the wall within the radius: the twin's test has it.
+    assert!((value - 0.548).abs() < 0.02, "{value}");
 }

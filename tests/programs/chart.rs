@@ -18,7 +18,8 @@ use cao_testing::{close, open};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-const METHODS: [&str; 14] = [
+/// Those of a first look: without `histograms`.
+const METHODS: [&str; 13] = [
     "solid colour",
     "image space",
     BASELINE,
@@ -32,7 +33,6 @@ const METHODS: [&str; 14] = [
     "SAT",
     "shells",
     "vicinity",
-    "histograms",
 ];
 const RUNS: u32 = 2;
 /// How far off foreseen minutes may be.

@@ -1,6 +1,7 @@
 //! The planner's promises, on a device: what it chooses keeps its budget on bricks that it has not seen, and takes the time that
 //! it foresaw.
 
+use cao::gpu::{Phase, Stage};
 use cao::renderer::{COLOUR, Renderer};
 use cao::stages;
 use cao::{Clip, Gpu, Pose, Shape};
@@ -86,7 +87,12 @@ fn taken(renderer: &mut Renderer, candidate: Candidate) -> f64 {
         .map(|_| {
             renderer.invalidate();
             let timings = renderer.update(&mut |_| ()).unwrap();
-            timings.iter().filter(|t| [stages::LAO, stages::RAYS].contains(&t.stage)).map(|t| t.ms).sum()
+            // Rays by the sampler are foreseen by themselves, other methods as a whole.
+            let own = |stage: Stage| match method {
+                Method::Lao => stage == stages::LAO,
+                _ => stage.phase == Phase::Ambient,
+            };
+            timings.iter().filter(|t| own(t.stage)).map(|t| t.ms).sum()
         })
         .collect();
     times.sort_by(f64::total_cmp);

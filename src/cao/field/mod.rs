@@ -114,6 +114,13 @@ impl Field {
     }
 }
 
+/// Spacings in smallest spacings, rounded to 65536ths: the same in every unit of length, whatever its lengths round, so that no tie of what is
+/// made of them turns.
+pub fn ratios(spacing: [f32; 3]) -> [f64; 3] {
+    let smallest = spacing.into_iter().fold(f32::INFINITY, f32::min);
+    spacing.map(|s| (65536.0 * f64::from(s) / f64::from(smallest)).round() / 65536.0)
+}
+
 /// Voxels along x, y, z, of which the bricks have numbers of 32 bits.
 fn dims(volume: &Volume) -> Result<[u32; 3]> {
     let bricks = volume.dims.map(|d| (d as u64).div_ceil(BRICK.into()));

@@ -2,7 +2,7 @@
 //! costs one pass over the clusters and one over the voxels.
 //!
 //! Clips change no value, only which voxels need one: a neighbourhood is that of the unclipped volume. Beside V_o and V_AO it takes 3 bytes
-//! a voxel, and 13 MiB for samples and clusters.
+//! a voxel, and 18 MiB for samples and clusters.
 
 use super::clusters::{Clusters, ROUNDS};
 use super::expand::{Bindings, Expand, Scene};

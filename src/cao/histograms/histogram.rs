@@ -5,7 +5,7 @@
 //! voxels, or one of every 2³, the number of the nearest cluster (3D r16uint). Cost: a read of a bin for each voxel of each neighbourhood,
 //! 7,152 at a radius of 12, and 64 differences for each cluster.
 
-use crate::field::Field;
+use crate::field::{Field, ratios};
 use crate::host::{row_of_groups, rows_over};
 use cao_gpu::Result;
 use cao_gpu::{
@@ -19,8 +19,8 @@ pub const MOST_VOXELS: f64 = 12.0;
 pub const MOST_FINE: u64 = 1 << 24;
 /// Fewest voxels that there have to be for each cluster: fewer are no compression.
 pub const VOXELS_A_CLUSTER: u64 = 256;
-/// Samples that a cluster is the mean of, where all are as large: 100,000 of the default's.
-const ROWS_A_CLUSTER: u32 = 98;
+/// Samples that a cluster is the mean of, where all are as large: 32,768 of the default's.
+const ROWS_A_CLUSTER: u32 = 32;
 /// Steps of a slab of `assign`, so that no submission takes long.
 const SLAB: f64 = 4e9;
 
@@ -46,14 +46,14 @@ impl HistogramPlan {
     pub fn new(dims: [u32; 3], spacing: [f32; 3], radius_mm: f32, clusters: u32, block: u32) -> Self {
         let smallest = f64::from(spacing.into_iter().fold(f32::INFINITY, f32::min));
         let radius = (f64::from(radius_mm) / smallest).min(MOST_VOXELS);
-        let edge = radius.floor() as i32;
+        // Rounding of lengths in mm must not lose a voxel.
+        let (edge, ratios) = ((radius * (1.0 + 1e-5)).floor() as i32, ratios(spacing));
         let mut offsets = Vec::new();
         for z in -edge..=edge {
             for y in -edge..=edge {
                 for x in -edge..=edge {
-                    let of = |c: i32, i: usize| (f64::from(c) * f64::from(spacing[i]) / smallest).powi(2);
+                    let of = |c: i32, i: usize| (f64::from(c) * ratios[i]).powi(2);
                     let squared = of(x, 0) + of(y, 1) + of(z, 2);
-                    // Rounding of lengths in mm must not lose one.
                     if squared > 0.0 && squared <= radius * radius * (1.0 + 1e-5) {
                         let place = [x, y, z].map(|c| (c + 128) as u32);
                         offsets.push(kernel::Offset {
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn the_largest_neighbourhood_has_the_voxels_and_weights_of_a_ball() {
         let plan = HistogramPlan::new([128; 3], [0.5; 3], 20.0, 1024, 1);
-        assert_eq!((plan.neighbours(), plan.clusters, plan.rows), (7152, 1024, 100_352));
+        assert_eq!((plan.neighbours(), plan.clusters, plan.rows), (7152, 1024, 32_768));
         let sum: f64 = plan.offsets.iter().map(|offset| f64::from(offset.weight) / 65536.0).sum();
         assert!((sum - 141.29).abs() < 0.01, "{sum}");
         assert!(plan.neighbours() < kernel::MOST_OFFSETS as usize);
@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn small_volumes_have_few_clusters_and_slabs_cover_all() {
         let plan = HistogramPlan::new([20; 3], [1.0; 3], 4.0, 1024, 1);
-        assert_eq!((plan.clusters, plan.rows, plan.stride), (31, 3038, 2));
+        assert_eq!((plan.clusters, plan.rows, plan.stride), (31, 992, 8));
         assert_eq!(HistogramPlan::new([3, 2, 1], [1.0; 3], 4.0, 1024, 1).clusters, 1);
         let large = HistogramPlan::new([257; 3], [1.0; 3], 12.0, 1024, 2);
         assert_eq!(large.coarse, [129; 3]);

@@ -8,6 +8,7 @@ use super::sums::{Counted, MOST_EXTINCTION};
 use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
+use crate::field::ratios;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
 use cao_kernels::boxes as kernel;
@@ -45,9 +46,7 @@ impl BoxPlan {
         let count = if rule == Quadrature::Box { 1 } else { shells.min(edge) };
         // The k-th of n at round(k·edge / n).
         let edges = (1..=count).map(|k| (2 * k * edge + count) / (2 * count)).filter(|edge| *edge > 0);
-        let half = |edge: u32| {
-            spacing.map(|s| (f64::from(edge) * f64::from(smallest_mm) / f64::from(s)).round() as u32)
-        };
+        let half = |edge: u32| ratios(spacing).map(|ratio| (f64::from(edge) / ratio).round() as u32);
         let voxels = |half: [u32; 3]| half.iter().map(|h| u64::from(2 * h + 1)).product::<u64>();
         let extinction = rule == Quadrature::Published;
         let counted = Counted::of(voxels(half(edge)), extinction).ok_or_else(|| cao_model::Error::Limit {

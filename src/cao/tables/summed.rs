@@ -12,7 +12,7 @@ use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Image, Recorder, Stage};
-use cao_model::settings::Setup;
+use cao_model::settings::{AntiAliasing, MapSettings, Setup};
 use std::sync::{Mutex, PoisonError};
 
 /// Boxes of the listed bricks: of one size, or in shells.
@@ -21,8 +21,11 @@ pub struct Summed<const SHELLS: bool> {
     boxes: Boxes,
     plan: BoxPlan,
     /// What the table holds once all that was recorded has run; `None` before the first.
-    held: Mutex<Option<Counted>>,
+    held: Mutex<Option<Held>>,
 }
+
+/// What a table is of, beside values, transfer function and clips: how opacities are counted, and the settings that cut voxels depend on.
+type Held = (Counted, AntiAliasing, MapSettings);
 
 fn plan(on: &Subject, setup: &Setup) -> cao_model::Result<BoxPlan> {
     BoxPlan::new(on.field.spacing, &setup.occlusion, setup.options.shells)
@@ -58,12 +61,13 @@ impl<const SHELLS: bool> Gather for Summed<SHELLS> {
 
     fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, changed: Changed) -> Vec<Part<'a>> {
         let counted = self.plan.counted;
+        let wanted = Some((counted, on.setup.anti_aliasing, on.setup.maps));
         vec![Part::long(stages::SUMS, move |rec| {
             let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
             // A radius alone changes no opacity.
-            if *held != Some(counted) || changed.opacities || changed.clips {
+            if *held != wanted || changed.opacities || changed.clips {
                 self.sums.record(rec, &on.field, opacity, counted)?;
-                *held = Some(counted);
+                *held = wanted;
             }
             Ok(())
         })]

@@ -7,6 +7,7 @@
 use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
+use crate::field::ratios;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Pipeline, Recorder};
 use cao_kernels::vicinity as kernel;
@@ -45,14 +46,16 @@ impl LinePlan {
                 hint: "make the radius smaller, or use another method".into(),
             });
         }
+        let ratios = ratios(spacing);
         let line = |(d, weight): ([f64; 3], f64)| {
-            // In voxels a mm, and how long one along the longest axis is.
-            let along: [f64; 3] = std::array::from_fn(|i| d[i] / f64::from(spacing[i]));
+            // In voxels a smallest spacing, and how long one along the longest axis is.
+            let along: [f64; 3] = std::array::from_fn(|i| d[i] / ratios[i]);
             let longest = along.into_iter().map(f64::abs).fold(0.0, f64::max);
             kernel::Direction {
                 step: along.map(|c| (f64::from(kernel::UNIT) * c / longest).round() as i32),
                 // A length in mm that rounded down must not lose a step.
-                steps: (f64::from(radius_mm) * longest * (1.0 + 1e-6)).floor() as u32,
+                steps: (f64::from(radius_mm) / f64::from(smallest_mm) * longest * (1.0 + 1e-6)).floor()
+                    as u32,
                 weighted: d.map(|c| (c * weight) as f32),
                 pad: Default::default(),
             }
@@ -64,7 +67,7 @@ impl LinePlan {
             directions: if near { Vec::new() } else { all.collect() },
             // A voxel of a line lies within half a voxel of it.
             reach_mm: radius_mm + 1.01 * diagonal,
-            slope: spacing.map(|s| 0.5 * smallest_mm / s),
+            slope: ratios.map(|ratio| (0.5 / ratio) as f32),
             smallest_mm,
         })
     }

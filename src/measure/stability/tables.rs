@@ -121,7 +121,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             super::tiny(numbers.largest()),
         ),
         ours: Ours::holding(numbers.largest() < 0.5 * LEVEL),
-        control_fails: floats.largest() > LEVEL,
+        control_fails: largest > LEVEL,
         setting: format!(
             "even opacity {OPACITY}, {}³ voxels, {} boxes of each radius in the upper half of each axis",
             plan.edge, plan.boxes

@@ -23,15 +23,15 @@ pub fn bins(values: &[f32]) -> Vec<usize> {
 
 /// The histogram around a voxel, of these bins.
 pub fn histogram(grid: &Grid, bins: &[usize], radius_mm: f32, voxel: [usize; 3]) -> Vec<u32> {
-    let smallest = grid.min_spacing();
+    let (ratios, smallest) = (grid.ratios(), f64::from(grid.min_spacing() as f32));
     let radius = (f64::from(radius_mm) / smallest).min(12.0);
-    let edge = radius.floor() as i64;
+    let edge = (radius * (1.0 + 1e-5)).floor() as i64;
     let (mut shares, mut sum) = (vec![0_u32; BINS as usize], 0_u32);
     for z in -edge..=edge {
         for y in -edge..=edge {
             for x in -edge..=edge {
                 let d = [x, y, z];
-                let squared: f64 = (0..3).map(|i| (d[i] as f64 * grid.spacing[i] / smallest).powi(2)).sum();
+                let squared: f64 = (0..3).map(|i| (d[i] as f64 * ratios[i]).powi(2)).sum();
                 if squared == 0.0 || squared > radius * radius * (1.0 + 1e-5) {
                     continue;
                 }
