@@ -18,10 +18,10 @@ pub struct Shown {
     pub setting: Setting,
     /// The left eye's picture.
     pub picture: Picture,
-    /// Errors on the surface, a pixel for every few of the picture: red too bright, blue too dark, white right, grey where nothing is shown.
-    pub error: Picture,
+    /// Errors on the surface, where it has ambient values: a pixel for every few of the picture: red too bright, blue too dark, white right, grey where nothing is shown.
+    pub error: Option<Picture>,
     /// The same as numbers.
-    pub errors: Errors,
+    pub errors: Option<Errors>,
 }
 
 /// Error at which the colours saturate.
@@ -57,8 +57,25 @@ pub(super) fn featured<'a>(
 
 impl Known {
     /// A contender's pictures.
-    pub(super) fn shown(&self, grid: &Grid, entry: &Entrant, image: &StereoImage, found: &Values) -> Shown {
+    pub(super) fn shown(
+        &self,
+        grid: &Grid,
+        entry: &Entrant,
+        image: &StereoImage,
+        found: Option<&Values>,
+    ) -> Shown {
         let [width, height] = image.size;
+        let (error, errors) = found.map(|found| self.surface_errors(grid, image.size, found)).unzip();
+        Shown {
+            method: entry.method,
+            setting: entry.setting.clone(),
+            picture: Picture::over(width, height, &image.colour[0], BACKGROUND),
+            error,
+            errors,
+        }
+    }
+
+    fn surface_errors(&self, grid: &Grid, [width, height]: [u32; 2], found: &Values) -> (Picture, Errors) {
         let value = |point: [f64; 3], pixel: usize| match found {
             Values::Voxels(values) => trilinear_clamped(grid, values, point) as f32,
             Values::Pixels(values) => values[pixel],
@@ -74,13 +91,8 @@ impl Known {
             pixels[y * small[0] as usize + x] = diverging((value - expected) / SATURATED);
         }
         let expected: Vec<f32> = self.surface.iter().map(|(.., value)| *value).collect();
-        Shown {
-            method: entry.method,
-            setting: entry.setting.clone(),
-            picture: Picture::over(width, height, &image.colour[0], BACKGROUND),
-            error: Picture { width: small[0], height: small[1], pixels },
-            errors: errors(&values, &expected, &vec![true; expected.len()]),
-        }
+        let errors = errors(&values, &expected, &vec![true; expected.len()]);
+        (Picture { width: small[0], height: small[1], pixels }, errors)
     }
 }
 

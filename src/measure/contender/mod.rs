@@ -25,8 +25,9 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 7] = [
+static CONTENDERS: [Kind; 8] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
+    Kind { name: PHONG, enters: Enters::By(solid::phong) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
     Kind {
@@ -86,6 +87,9 @@ impl Kind {
 /// Name of no ambient occlusion, the paper's "solid colour" (CAO §4).
 pub const SOLID: &str = "solid colour";
 
+/// Name of light from one side without ambient occlusion, which CAO leaves for later (§6).
+pub const PHONG: &str = "Phong";
+
 /// Name of the contender that times are quoted against: the paper's naive recomputation (method.md §2).
 pub const BASELINE: &str = "LAO (unit)";
 
@@ -98,6 +102,16 @@ pub fn name(method: Method) -> &'static str {
 /// Every contender for such a scene.
 pub fn all(asked: &Asked) -> Vec<Entrant> {
     CONTENDERS.iter().flat_map(|kind| kind.entrants(asked)).collect()
+}
+
+/// The paper's two methods with so many of its rays: the naive recomputation, and the contextual update of every voxel.
+pub fn printed(rays: RaySet, min_spacing: f64) -> [Entrant; 2] {
+    paper::printed([BASELINE, name(Method::Cao)], rays, min_spacing)
+}
+
+/// The one without occlusion.
+pub fn solid() -> Entrant {
+    solid::entrant(SOLID)
 }
 
 /// Place of a name in the legend.
@@ -203,6 +217,8 @@ pub struct Entrant {
     pub setting: Setting,
     /// Rough cost of an update in rays cast from every voxel: for the order of progress only.
     pub work: f64,
+    /// Whether it has ambient values; else only its pictures are of interest, and what drawing them takes.
+    pub has_values: bool,
     /// Prepares it, up to date with the state given.
     pub open: Open,
 }
@@ -266,14 +282,17 @@ mod tests {
     #[test]
     fn names_stay() {
         let names = CONTENDERS.each_ref().map(|kind| kind.name);
-        assert_eq!(names, ["solid colour", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"]);
+        assert_eq!(
+            names,
+            ["solid colour", "Phong", "image space", "LAO (unit)", "LAO", "CAO literal", "CAO", "rays"]
+        );
         assert_eq!(METHODS.iter().map(|e| name(e.method)).collect::<Vec<_>>(), ["LAO", "CAO", "rays"]);
-        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(names.map(place), [0, 1, 2, 3, 4, 5, 6, 7]);
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        for (quick, counts) in [(true, [1, 1, 4, 8, 2, 8, 6]), (false, [1, 3, 4, 21, 4, 21, 15])] {
+        for (quick, counts) in [(true, [1, 1, 1, 4, 8, 2, 8, 6]), (false, [1, 1, 3, 4, 21, 4, 21, 15])] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
                 for b in &entrants[..i] {

@@ -9,6 +9,7 @@ pub mod anisotropy;
 pub mod concave;
 pub mod cut;
 pub mod dilation;
+pub mod map;
 pub mod motion;
 pub mod numbers;
 pub mod page;
@@ -188,7 +189,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 11] = [
+pub const TRIALS: [Trial; 12] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -208,6 +209,11 @@ pub const TRIALS: [Trial; 11] = [
         name: "dilation",
         title: "Which dilation map leaves voxels stale?",
         run: |gpu, effort, progress| dilation::run(gpu, &dilation::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "map",
+        title: "How large does a clip's depth map have to be?",
+        run: |gpu, effort, progress| map::run(gpu, &map::Plan::of(effort), progress),
     },
     Trial {
         name: "concave",
