@@ -50,7 +50,6 @@ fn twins(criterion: &mut Criterion) {
         reference_mm,
         ambient: &ambient,
         clips: &clips,
-        parts: None,
         step_mm: 0.5,
         look: Look::default(),
     };

@@ -15,9 +15,10 @@ use crate::volume::Volume;
 use crate::{Error, Result};
 
 /// Names of the built-in volumes, each with one line on what it is.
-pub const NAMES: [(&str, &str); 8] = [
+pub const NAMES: [(&str, &str); 9] = [
     ("engine", "uint8; engine block (110) with bores, bolt holes, oil channels; liners (150), valves (230)"),
     ("fruit", "uint8; rind (200), pith (50), soft flesh (70-120), membranes (140), seeds (240), core (180)"),
+    ("beetle", "uint8; a thin shell of chitin (180) with six hollow legs, tissue (40), a hollow trunk"),
     (
         "skeleton",
         "int16, Hounsfield; spine, ribs, breastbone and pelvis of thin bone (300-1000) in soft tissue (40)",
@@ -68,6 +69,7 @@ pub fn builtin_box(name: &str, dims: [usize; 3], spacing: [f64; 3]) -> Result<Vo
     let values = match name {
         "engine" => Values::U8(sampled(dims, |p, h| engine(p, h) as u8)),
         "fruit" => Values::U8(sampled(dims, |p, h| fruit(p, h) as u8)),
+        "beetle" => Values::U8(sampled(dims, |p, h| beetle(p, h) as u8)),
         "skeleton" => Values::I16(sampled(dims, |p, h| skeleton(p, h) as i16)),
         "empty" => Values::U8(indexed(dims, |_| false)),
         "uniform" => Values::U8(indexed(dims, |_| true)),
@@ -275,6 +277,37 @@ fn fruit([x, y, z]: [f64; 3], h: f64) -> f64 {
     value = over(value, 180.0, r - 0.3, h);
     value = over(value, 0.0, r - 0.26, h);
     nearest(over(value, 0.0, (length2(x, y) - 0.08).max(0.7 - z), h))
+}
+
+/// Abdomen, thorax and head along -y: ellipsoids of tissue (40) in a shell of chitin (180) 0.03 thick, the abdomen's inside empty and its wing cases apart
+/// along a seam of 0.016 on top (+z). Three pairs of hollow legs of two rods each (radius 0.045, walls 0.02), which stand out to the side and down, and two
+/// jaws. The size of a stag beetle in its box, which has more of its opacity in thin sheets than any other scene here.
+fn beetle([x, y, z]: [f64; 3], h: f64) -> f64 {
+    let side = x.abs();
+    let trunk = [
+        ellipsoid([x, y - 0.3, z - 0.1], [0.5, 0.6, 0.6]),
+        ellipsoid([x, y + 0.36, z - 0.05], [0.42, 0.24, 0.48]),
+        ellipsoid([x, y + 0.64, z], [0.24, 0.17, 0.3]),
+    ];
+    let inside = trunk.into_iter().fold(f64::INFINITY, f64::min);
+    let shell = trunk.into_iter().fold(f64::INFINITY, |d, part| d.min(part.max(-0.03 - part)));
+    let seam = (side - 0.008).max(0.2 - z).max(-0.1 - y);
+    let mut value = over(0.0, 40.0, inside, h);
+    value = over(value, 0.0, ellipsoid([x, y - 0.3, z - 0.1], [0.36, 0.45, 0.42]), h);
+    value = over(value, 180.0, shell.max(-seam), h);
+    // The nearest pair of legs: they leave the trunk 0.35 apart.
+    let pair = (nearest((y - 0.02) / 0.35).clamp(-1.0, 1.0)) * 0.35;
+    let (hip, lean) = ([0.3, pair + 0.02, -0.25], 0.3 * pair);
+    let (knee, foot) = ([0.7, hip[1] + lean, 0.05], [0.9, hip[1] + 2.0 * lean, -0.92]);
+    let leg = rod([side, y, z], hip, knee, 0.045).min(rod([side, y, z], knee, foot, 0.045));
+    value = over(value, 180.0, leg.max(-0.02 - leg).max(-inside), h);
+    let jaw = rod([side, y, z], [0.1, -0.78, 0.0], [0.2, -0.9, 0.05], 0.04).min(rod(
+        [side, y, z],
+        [0.2, -0.9, 0.05],
+        [0.05, -0.95, 0.08],
+        0.03,
+    ));
+    nearest(over(value, 180.0, jaw, h))
 }
 
 /// A trunk in Hounsfield units: air -1000, an elliptic body (half-axes 0.92 × 0.7 along x and y) of soft tissue 40

@@ -356,7 +356,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/measure/planner.rs", &["failure", "random"]),
     ("src/measure/reference.rs", &["failure", "kernels", "random"]),
     ("src/measure/contender/", &["failure", "kernels"]),
-    ("src/measure/stability/", &["failure", "error", "exactness", "plot", "random", "reference"]),
+    ("src/measure/stability/", &["failure", "error", "exactness", "flip", "plot", "random", "reference"]),
     (
         "src/measure/chart/",
         &[

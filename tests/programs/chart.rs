@@ -4,12 +4,12 @@ use crate::support::Folder;
 use cao::renderer::{COLOUR, Renderer};
 use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, foresee, looks_draw, measure, report};
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, foresee, looks_draw, measure, paper, report};
 use cao_measure::contender::{BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
 use cao_model::methods::Method;
-use cao_model::occlusion::Quadrature;
+use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::samples::Filter;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -79,6 +79,54 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     drawings_are_well_formed_and_show_every_method_and_change(&chart);
     the_report_stands_alone_and_has_every_part(&chart);
     the_picture_is_drawn_in_every_way_and_more_work_errs_less(&chart);
+}
+
+/// Sizes of a sixteenth: what is tested is that everything is there and belongs together.
+#[test]
+fn the_papers_scenes_have_their_shares_tables_and_pictures() {
+    let gpu = open();
+    let plan = paper::Plan { divide: 16, runs: 1, size: [48; 2] };
+    let scenes = paper::scenes(&plan, Vec::new()).unwrap();
+    assert_eq!(
+        scenes.iter().map(|s| s.volume.dims).collect::<Vec<_>>(),
+        [[16, 16, 6], [26, 26, 15], [32; 3]]
+    );
+    let needs = paper::estimate(&gpu, &scenes, &plan).unwrap();
+    assert!(needs.seconds > 0.0 && needs.bytes > 32_768);
+    let found = paper::measure(&gpu, scenes, &plan, &mut |_, share| assert!(share <= 1.0)).unwrap();
+    close(gpu);
+    for ([printed, share], expected) in found.shares.iter().zip([14.94, 20.24, 16.13]) {
+        // One layer of voxels more or less is more than a tenth of a percent of volumes so small.
+        assert!(*printed == expected && (share - printed).abs() < 1.0, "{share} for {printed}");
+    }
+    for scene in &found.chart.scenes {
+        assert_eq!(scene.points.len(), 8);
+        assert!(scene.points.iter().all(|p| p.runs.len() == 2 && p.ms()[1] > 0.0));
+        let methods: Vec<&str> = scene.draws.iter().map(|(name, _)| *name).collect();
+        assert_eq!(methods, ["solid colour", BASELINE, "CAO"]);
+    }
+    let numbers: Vec<u32> = found.figures.iter().map(|(number, ..)| *number).collect();
+    assert_eq!(numbers, [1, 8, 10, 10, 10, 11, 11, 11]);
+    for (number, shows, picture) in &found.figures {
+        let width = picture.width as usize;
+        assert_eq!(width, if *number == 1 { 48 } else { 96 }, "{shows}");
+        let lit = picture.pixels.iter().filter(|p| p.iter().any(|&c| c > 20)).count();
+        assert!(20 * lit > picture.pixels.len(), "{shows} shows nothing");
+        if width == 96 {
+            // Its halves differ: by samples, or by rays.
+            let different = picture.pixels.chunks(width).filter(|row| row[..48] != row[48..]).count();
+            assert!(different > 0, "{shows}");
+        }
+    }
+    assert!(found.speed_ups(RaySet::R54).iter().all(|up| up.is_finite()));
+    let page = found.html("a machine", "cao chart --paper").unwrap();
+    for part in ["paper: Beetle", "÷ 16", "Fig. 8, engine", "85.363", "spherical ray cast", "printed 20.24 %"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
+    let four = (0..4).map(|n| (n.to_string(), builtin("voxel", 4).unwrap())).collect();
+    let refused = paper::scenes(&plan, four).unwrap_err().to_string();
+    assert!(refused.contains("--data") && refused.contains("engine, beetle, skeleton"), "{refused}");
 }
 
 fn the_picture_is_drawn_in_every_way_and_more_work_errs_less(chart: &Chart) {
@@ -355,8 +403,9 @@ fn the_report_stands_alone_and_has_every_part(chart: &Chart) {
     well_formed(&with).unwrap();
     assert_eq!(references(&with), [""; 0]);
     assert_eq!(references("<img src=\"a.png\"> http://x <img src=\"data:,\">").len(), 2);
-    // Two pictures of each method.
-    assert_eq!(with.matches("data:image/png;base64,").count(), 2 * METHODS.len());
+    // Two pictures of each method, and the one of light that has no ambient values.
+    assert_eq!(with.matches("data:image/png;base64,").count(), 2 * METHODS.len() + 1);
+    assert!(with.contains("<b>Phong</b>, -: no ambient values; drawn in "));
     // As printed: a row of each of the paper's three tables.
     for printed in [
         "(default)",

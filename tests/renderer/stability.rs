@@ -2,8 +2,9 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, mip_blocks,
-    motion, noise, numbers, pixels, radius, sheets, shells, stacked_layers, stereo, tables, thin_sheets, views,
+    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
+    mip_blocks, motion, noise, numbers, pixels, radius, sheets, shells, stacked_layers, stereo, tables,
+    thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -100,6 +101,24 @@ fn the_published_dilation_map_leaves_stale_voxels_at_every_size() {
     for name in ["conservative (ours)", "conservative (ours), on the device"] {
         assert_eq!(curve(&finding, 0, name).largest(), 0.0, "{name}");
     }
+    close(gpu);
+}
+
+#[test]
+fn a_depth_map_misplaces_a_cut_by_half_a_pixel_and_leaves_nothing_stale() {
+    let gpu = open();
+    let plan = map::Plan { edge: 24, resolutions: vec![32, 128, 512], pixels: 64 };
+    let finding = map::run(&gpu, &plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let largest = curve(&finding, 0, "largest");
+    // A map with four times the pixels is four times as near, or the measure measures something else.
+    for (coarse, fine) in [(32.0, 128.0), (128.0, 512.0)] {
+        let ratio = largest.at(coarse) / largest.at(fine);
+        assert!((2.0..8.0).contains(&ratio), "{}", finding.sentence);
+    }
+    assert!(largest.at(32.0) > 0.2 * curve(&finding, 0, "√½").at(32.0), "{}", finding.sentence);
+    assert_eq!(curve(&finding, 1, "conservative").largest(), 0.0);
+    assert!(curve(&finding, 2, "ours").at(32.0) > curve(&finding, 2, "ours").at(128.0));
     close(gpu);
 }
 

@@ -39,7 +39,7 @@ More in `cao render --help` and so on.
 
 Volumes: NRRD, NIfTI, MetaImage, raw values with --dims and --type, and
 built-in ones, named like files: builtin:NAME:SIZE, with NAME one of
-engine, fruit, skeleton, empty, uniform, half-space, voxel, sheets.
+engine, fruit, beetle, skeleton, empty, uniform, half-space, voxel, sheets.
 Lengths are millimetres, angles degrees. The origin is the volume's centre;
 x, y, z are the patient's right, anterior, superior where a file states them,
 else the volume's index axes.
@@ -344,6 +344,12 @@ pub struct Chart {
     /// Fewer settings, smaller built-in scenes, a coarser reference
     #[arg(long)]
     pub quick: bool,
+    /// The paper's own three scenes, tables and pictures instead
+    #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm"])]
+    pub paper: bool,
+    /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms
+    #[arg(long, value_name = "FILE", requires = "paper")]
+    pub data: Vec<OsString>,
     /// A peers.json of tools/peers, for a table of other systems in the report
     #[arg(long, value_name = "FILE")]
     pub peers: Option<PathBuf>,

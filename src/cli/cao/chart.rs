@@ -29,10 +29,27 @@ const QUICK_RADIUS: f32 = 6.0;
 const FILES: [&str; 7] =
     ["runs.csv", "chart.svg", "chart.png", "pictures.csv", "pictures.svg", "pictures.png", "report.html"];
 
+/// What `--paper` writes.
+const PAPER: [&str; 10] = [
+    "paper.html",
+    "runs.csv",
+    "figure-1.png",
+    "figure-8.png",
+    "figure-10-engine.png",
+    "figure-10-beetle.png",
+    "figure-10-skeleton.png",
+    "figure-11-engine.png",
+    "figure-11-beetle.png",
+    "figure-11-skeleton.png",
+];
+
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
         bail!("cannot write {}: there is no folder {}", shown_path(&args.output), shown_path(around));
+    }
+    if args.paper {
+        return paper(global, args);
     }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
@@ -78,6 +95,63 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     let mut out = Out::new(global);
     out.device(&gpu);
     summary(&mut out, &chart);
+    for path in targets.paths() {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `--paper`: says what it will take, then measures.
+fn paper(global: &Global, args: &Args) -> Result<ExitCode> {
+    let targets = Targets::in_folder(&args.output, PAPER.map(str::to_owned))?;
+    let mut progress = Progress::default();
+    progress.stage("reading");
+    let files = args.data.iter().map(|name| {
+        let volume = args.raw.open(name)?;
+        Ok((shown_path(name), volume))
+    });
+    let files = files.collect::<Result<Vec<_>>>()?;
+    targets.spare_inputs()?;
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let plan = chart::paper::Plan::of(&gpu, args.quick, args.runs);
+    let scenes = chart::paper::scenes(&plan, files)?;
+    let needs = chart::paper::estimate(&gpu, &scenes, &plan)?;
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    let needs = format!(
+        "about {:.0} s and {:.2} GB of device memory, by a small update on this device",
+        needs.seconds.ceil(),
+        needs.bytes as f64 / 1e9
+    );
+    out.line(format!("foreseen  {needs}"));
+    progress.aside(|| out.show())?;
+    progress.stage("measuring");
+    let found = chart::paper::measure(&gpu, scenes, &plan, &mut |what, share| {
+        progress.say(what);
+        progress.set(share);
+    })?;
+    check_validation(&gpu)?;
+    progress.stage("writing");
+    let mut contents =
+        vec![found.html(&machine(), &command())?.into_bytes(), csv::runs(&found.chart).into_bytes()];
+    for number in [1, 8, 10, 11] {
+        let own: Vec<_> = found.figures.iter().filter(|(of, ..)| *of == number).collect();
+        for (.., picture) in own {
+            contents.push(picture.png()?);
+        }
+    }
+    targets.write_all(&contents)?;
+    drop(progress);
+    for line in found.caption() {
+        out.line(line);
+    }
+    for rays in ["6", "54"] {
+        let set = cao_model::occlusion::RaySet::parse(rays)?;
+        let ups: Vec<String> = found.speed_ups(set).iter().map(|up| format!("{up:.2}")).collect();
+        out.line(format!("speed-up of the update with {rays} rays: {}", ups.join(", ")));
+    }
     for path in targets.paths() {
         out.wrote(path);
     }

@@ -10,6 +10,7 @@ pub mod draw;
 pub mod front;
 pub mod looks;
 pub mod looks_draw;
+pub mod paper;
 pub mod peers;
 pub mod pictures;
 pub mod report;
@@ -490,6 +491,9 @@ fn compete_in(
         for run in 0..=plan.runs as usize {
             let mut of_baseline = f64::NAN;
             for (n, (entry, contender)) in entries.iter().zip(&mut open).enumerate() {
+                if !entry.has_values {
+                    continue;
+                }
                 say(change.name(), work);
                 let stages = contender.update(change, states[run % 2])?;
                 work.done += Work::update(scene, entry);
@@ -533,8 +537,8 @@ fn compete_in(
     for (entry, contender) in entries.iter().zip(&open) {
         if featured.iter().any(|(method, setting)| *method == entry.method && *setting == entry.setting) {
             let (image, _) = contender.draw(&look)?;
-            let found = contender.ambient()?;
-            shown.push(truths[0].shown(&scene.grid(), entry, &image, &found));
+            let found = entry.has_values.then(|| contender.ambient()).transpose()?;
+            shown.push(truths[0].shown(&scene.grid(), entry, &image, found.as_ref()));
         }
     }
     Ok((points.into_iter().flatten().collect(), draws, shown))

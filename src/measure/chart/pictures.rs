@@ -18,12 +18,12 @@ pub struct Shown {
     pub setting: Setting,
     /// The left eye's picture.
     pub picture: Picture,
-    /// Errors on the surface, a pixel for every few of the picture: red too bright, blue too dark, white right, grey where nothing is shown.
-    pub error: Picture,
+    /// Errors on the surface, where it has ambient values: a pixel for every few of the picture: red too bright, blue too dark, white right, grey where nothing is shown.
+    pub error: Option<Picture>,
     /// The same as numbers.
-    pub errors: Errors,
+    pub errors: Option<Errors>,
     /// What remains of them after the best affine fit of its tone.
-    pub shape: Errors,
+    pub shape: Option<Errors>,
 }
 
 /// Error at which the colours saturate.
@@ -60,8 +60,32 @@ pub(super) fn featured<'a>(
 
 impl Known {
     /// A contender's pictures.
-    pub(super) fn shown(&self, grid: &Grid, entry: &Entrant, image: &StereoImage, found: &Values) -> Shown {
+    pub(super) fn shown(
+        &self,
+        grid: &Grid,
+        entry: &Entrant,
+        image: &StereoImage,
+        found: Option<&Values>,
+    ) -> Shown {
         let [width, height] = image.size;
+        let (error, errors) = found.map(|found| self.surface_errors(grid, image.size, found)).unzip();
+        Shown {
+            method: entry.method,
+            setting: entry.setting.clone(),
+            picture: Picture::over(width, height, &image.colour[0], BACKGROUND),
+            error,
+            errors: errors.map(|[raw, _]| raw),
+            shape: errors.map(|[_, shape]| shape),
+        }
+    }
+
+    /// The picture of them, and as numbers, raw and with the tone fitted.
+    fn surface_errors(
+        &self,
+        grid: &Grid,
+        [width, height]: [u32; 2],
+        found: &Values,
+    ) -> (Picture, [Errors; 2]) {
         let value = |point: [f64; 3], pixel: usize| match found {
             Values::Voxels(values) => trilinear_clamped(grid, values, point) as f32,
             Values::Pixels(values) => values[pixel],
@@ -78,14 +102,8 @@ impl Known {
         }
         let expected: Vec<f32> = self.surface.iter().map(|(.., value)| *value).collect();
         let counts = vec![true; expected.len()];
-        Shown {
-            method: entry.method,
-            setting: entry.setting.clone(),
-            picture: Picture::over(width, height, &image.colour[0], BACKGROUND),
-            error: Picture { width: small[0], height: small[1], pixels },
-            errors: errors(&values, &expected, &counts),
-            shape: shape_errors(&values, &expected, &counts).0,
-        }
+        let found = [errors(&values, &expected, &counts), shape_errors(&values, &expected, &counts).0];
+        (Picture { width: small[0], height: small[1], pixels }, found)
     }
 }
 

@@ -7,7 +7,8 @@ use super::pictures::{SATURATED, Shown};
 use super::tables::{self, escaped};
 use super::{Change, Chart};
 use crate::Result;
-use crate::plot::Drawing;
+use crate::contender::SOLID;
+use crate::plot::{Drawing, short};
 use std::fmt::Write as _;
 
 const STYLE: &str = "
@@ -84,18 +85,23 @@ pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) 
         let table = tables::everything(chart, change);
         let _ = writeln!(body, "<details><summary>{}</summary>\n{table}</details>", change.name());
     }
-    Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>cao chart</title><style>{STYLE}</style></head>\n<body>\n{body}</body></html>\n"
-    ))
+    Ok(page("cao chart", &body))
 }
 
-fn section(title: &str, says: &str) -> String {
+/// A page that stands alone.
+pub(super) fn page(title: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style></head>\n<body>\n{body}</body></html>\n"
+    )
+}
+
+pub(super) fn section(title: &str, says: &str) -> String {
     let says = if says.is_empty() { String::new() } else { format!("<p>{}</p>\n", escaped(says)) };
     format!("<h2>{}</h2>\n{says}", escaped(title))
 }
 
 /// A drawing inside the page, where SVG needs no name space.
-fn inline(drawing: &Drawing) -> String {
+pub(super) fn inline(drawing: &Drawing) -> String {
     let svg = drawing.svg().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
     // Sizes in the page are the page's own.
     match (number(&svg, " width=\""), number(&svg, " height=\"")) {
@@ -119,21 +125,30 @@ fn methods(chart: &Chart) -> Result<String> {
         escaped(&scene.name)
     );
     for shown in &scene.pictures {
-        html += &figure(shown)?;
+        let ms = |method: &str| scene.draws.iter().find(|(name, _)| *name == method).map(|(_, ms)| *ms);
+        html += &figure(shown, ms(shown.method).zip(ms(SOLID)))?;
     }
     Ok(html + "</div>\n")
 }
 
-fn figure(shown: &Shown) -> Result<String> {
-    let e = &shown.errors;
+/// `drawing` has the ms of drawing both eyes, and of doing so in solid colour.
+fn figure(shown: &Shown, drawing: Option<(f64, f64)>) -> Result<String> {
+    let picture = data(&shown.picture.png()?);
+    let name = format!("<b>{}</b>, {}", escaped(shown.method), escaped(&shown.setting.name()));
+    let drawn = match drawing {
+        Some((own, solid)) => format!("; drawn in {} × solid colour's time", short(own / solid)),
+        None => String::new(),
+    };
+    let (Some(error), Some(e), Some(shape)) = (&shown.error, &shown.errors, &shown.shape) else {
+        return Ok(format!(
+            "<figure><img alt=\"picture\" src=\"{picture}\"><figcaption>{name}: no ambient values{drawn}</figcaption></figure>\n"
+        ));
+    };
     Ok(format!(
-        "<figure><img alt=\"picture\" src=\"{}\"><img class=\"error\" alt=\"error\" src=\"{}\"><figcaption><b>{}</b>, {}: RMSE {:.4}, tone fitted {:.4}, bias {:+.4}, largest {:.3} at {} points of the surface</figcaption></figure>\n",
-        data(&shown.picture.png()?),
-        data(&shown.error.png()?),
-        escaped(shown.method),
-        escaped(&shown.setting.name()),
+        "<figure><img alt=\"picture\" src=\"{picture}\"><img class=\"error\" alt=\"error\" src=\"{}\"><figcaption>{name}: RMSE {:.4}, tone fitted {:.4}, bias {:+.4}, largest {:.3} at {} points of the surface{drawn}</figcaption></figure>\n",
+        data(&error.png()?),
         e.rmse,
-        shown.shape.rmse,
+        shape.rmse,
         e.bias,
         e.max,
         e.count
@@ -141,7 +156,7 @@ fn figure(shown: &Shown) -> Result<String> {
 }
 
 /// A PNG as a data URI (RFC 2397).
-fn data(png: &[u8]) -> String {
+pub(super) fn data(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64(png))
 }
 

@@ -36,6 +36,7 @@ fn entrant(name: &'static str, samples: u32) -> Entrant {
             details: format!("both eyes' depth images, bias {BIAS_VOXELS} voxel; halved"),
         },
         work: 0.5,
+        has_values: true,
         open: Box::new(move |arena, state| Ok(Box::new(ImageSpace::open(arena, state, samples)?))),
     }
 }

@@ -26,8 +26,9 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 14] = [
+static CONTENDERS: [Kind; 15] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
+    Kind { name: PHONG, enters: Enters::By(solid::phong) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
     Kind { name: BASELINE, enters: Enters::By(paper::unit) },
     Kind {
@@ -165,6 +166,9 @@ const HALF_SPHERE: f32 = 0.5;
 /// Name of no ambient occlusion, the paper's "solid colour" (CAO §4).
 pub const SOLID: &str = "solid colour";
 
+/// Name of light from one side without ambient occlusion, which CAO leaves for later (§6).
+pub const PHONG: &str = "Phong";
+
 /// Name of the contender that times are quoted against: the paper's naive recomputation (method.md §2).
 pub const BASELINE: &str = "LAO (unit)";
 
@@ -182,6 +186,16 @@ pub fn label_of(method: Method, options: &Options) -> String {
 /// Every contender for such a scene.
 pub fn all(asked: &Asked) -> Vec<Entrant> {
     CONTENDERS.iter().flat_map(|kind| kind.entrants(asked)).collect()
+}
+
+/// The paper's two methods with so many of its rays: the naive recomputation, and the contextual update of every voxel.
+pub fn printed(rays: RaySet, min_spacing: f64) -> [Entrant; 2] {
+    paper::printed([BASELINE, name(Method::Cao)], rays, min_spacing)
+}
+
+/// The one without occlusion.
+pub fn solid() -> Entrant {
+    solid::entrant(SOLID)
 }
 
 /// Place of a name in the legend.
@@ -287,6 +301,8 @@ pub struct Entrant {
     pub setting: Setting,
     /// Rough cost of an update in rays cast from every voxel: for the order of progress only.
     pub work: f64,
+    /// Whether it has ambient values; else only its pictures are of interest, and what drawing them takes.
+    pub has_values: bool,
     /// Prepares it, up to date with the state given.
     pub open: Open,
 }
@@ -354,6 +370,7 @@ mod tests {
             names,
             [
                 "solid colour",
+                "Phong",
                 "image space",
                 "LAO (unit)",
                 "fdAO",
@@ -379,8 +396,8 @@ mod tests {
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        let quick = [1, 1, 4, 2, 8, 2, 8, 1, 2, 6, 1, 2, 1, 0];
-        let full = [1, 3, 4, 3, 21, 4, 21, 6, 2, 15, 1, 12, 3, 1];
+        let quick = [1, 1, 1, 4, 2, 8, 2, 8, 1, 2, 6, 1, 2, 1, 0];
+        let full = [1, 1, 3, 4, 3, 21, 4, 21, 6, 2, 15, 1, 12, 3, 1];
         for (quick, counts) in [(true, quick), (false, full)] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::{Asked, Entrant, Setting, rendered};
 use cao_model::methods::Method;
-use cao_model::occlusion::{Occlusion, RaySet};
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::{MapSettings, Scope, Setup};
 
 /// The paper's ray sets.
@@ -27,6 +27,19 @@ pub fn literal(name: &'static str, asked: &Asked) -> Vec<Entrant> {
     let maps = MapSettings { literal: true, resolution: MAPS, cells: MAPS, ..own.maps };
     let computes = format!("the paper's dilation maps, {MAPS} x {MAPS}");
     entrants(name, if asked.quick { &FEW } else { &SETS }, Setup { maps, ..own }, &computes, asked)
+}
+
+/// Both of its methods with one of its sets: the naive recomputation, and contextual updates with a value for every voxel (CAO Table 3).
+pub fn printed(names: [&'static str; 2], rays: RaySet, min_spacing: f64) -> [Entrant; 2] {
+    let of = |name, method, computes| {
+        let own = Setup::of(method, min_spacing);
+        let occlusion = Occlusion { rays, quadrature: Quadrature::Left, ..own.occlusion };
+        let setting = Setting::rays(&occlusion, min_spacing, computes);
+        let setup = Setup { occlusion, scope: Scope::All, ..own };
+        rendered::entrant(name, setup, setting, rays.count() as f64, 1.0)
+    };
+    let [lao, cao] = names;
+    [of(lao, Method::Lao, "every voxel recomputed"), of(cao, Method::Cao, "every voxel that changed")]
 }
 
 fn entrants(

@@ -14,6 +14,7 @@ pub fn entrant(name: &'static str, setup: Setup, setting: Setting, work: f64, co
         method: name,
         setting,
         work,
+        has_values: true,
         open: Box::new(move |arena, state| Ok(Box::new(Rendered::open(arena, setup, counts, state)?))),
     }
 }

@@ -108,7 +108,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     let curve = |which: usize| counts.iter().map(|(x, sum)| [*x, sum[which] as f64]).collect::<Vec<_>>();
     let single = Series::control("eq. (4) as printed, 32-bit depth", curve(0));
     let half = Series::control("eq. (4) as printed, 16-bit depth", curve(1));
-    let programmed = Series::control("as programmed by the authors", curve(2));
+    let programmed = Series::yardstick("as programmed by the authors", curve(2));
     let ours = Series::ours("conservative (ours)", curve(3));
     let device = Series::ours(format!("conservative (ours), on the device, {DEVICE_CELLS}² cells"), curve(4));
     let (first, last) = (plan.resolutions[0], plan.resolutions[plan.resolutions.len() - 1]);

@@ -12,6 +12,7 @@ pub mod cut;
 pub mod dilation;
 pub mod labels;
 pub mod layers;
+pub mod map;
 pub mod mip_blocks;
 pub mod motion;
 pub mod noise;
@@ -197,7 +198,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 20] = [
+pub const TRIALS: [Trial; 21] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -217,6 +218,11 @@ pub const TRIALS: [Trial; 20] = [
         name: "dilation",
         title: "Which dilation map leaves voxels stale?",
         run: |gpu, effort, progress| dilation::run(gpu, &dilation::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "map",
+        title: "How large does a clip's depth map have to be?",
+        run: |gpu, effort, progress| map::run(gpu, &map::Plan::of(effort), progress),
     },
     Trial {
         name: "concave",
