@@ -95,14 +95,10 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let control_fails = (1..LAYERS.len()).all(|n| shares[n].at(last) < 0.9);
     Ok(Finding {
         sentence: format!(
-            "At {} voxels LAO leaves {}; feature-driven occlusion leaves each all of it, and {} the less of the two with the radius.",
+            "At {} voxels LAO leaves {}; feature-driven occlusion leaves each all of it, and {} more with the radius than by LAO.",
             short(last),
             told.join(", "),
-            if keeps {
-                "no inner layer changes more than by LAO, all change"
-            } else {
-                "NOT EVERY inner layer changes"
-            }
+            if keeps { "no inner layer changes" } else { "AN INNER layer changes" }
         ),
         ours: Ours::holding(keeps),
         control_fails,
