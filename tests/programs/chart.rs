@@ -112,8 +112,9 @@ fn the_papers_scenes_have_their_shares_tables_and_pictures() {
         assert_eq!(width, if *number == 1 { 48 } else { 96 }, "{shows}");
         let lit = picture.pixels.iter().filter(|p| p.iter().any(|&c| c > 20)).count();
         assert!(20 * lit > picture.pixels.len(), "{shows} shows nothing");
-        if width == 96 {
-            // Its halves differ: by samples, or by rays.
+        // Rays through an engine of 16 voxels have one sample, before which nothing is occluded.
+        if width == 96 && !shows.starts_with("engine") {
+            // Its halves differ by their rays.
             let different = picture.pixels.chunks(width).filter(|row| row[..48] != row[48..]).count();
             assert!(different > 0, "{shows}");
         }

@@ -400,7 +400,8 @@ fn anti_aliasing(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<(u32, String, 
     Ok((8, format!("{}: N = 0 and N = 32, × {CROP}", scene.name), beside(&both)))
 }
 
-/// The first pixel of the part, a [`CROP`]th of both edges, in which two pictures of one size differ most: what a close-up is to show.
+/// The first pixel of the part, a [`CROP`]th of both edges, in which two pictures of one size differ most: what a close-up is to show. Where
+/// they are the same, of the lightest.
 fn most_different(pictures: &[Picture]) -> [u32; 2] {
     let [a, b] = pictures else { return [0; 2] };
     let part = [a.width, a.height].map(|edge| edge / CROP);
@@ -413,7 +414,12 @@ fn most_different(pictures: &[Picture]) -> [u32; 2] {
     // Half a part apart, all within.
     let steps = 2 * CROP - 1;
     let places = (0..steps * steps).map(|n| [n % steps * part[0] / 2, n / steps * part[1] / 2]);
-    places.max_by_key(|&place| differences(place)).unwrap_or([0; 2])
+    let light = |[x, y]: [u32; 2]| -> u64 {
+        let pixels =
+            (y..y + part[1]).flat_map(|row| (x..x + part[0]).map(move |column| row * a.width + column));
+        pixels.map(|i| u64::from(a.pixels[i as usize][1])).sum()
+    };
+    places.max_by_key(|&place| (differences(place), light(place))).unwrap_or([0; 2])
 }
 
 /// A [`CROP`]th of both edges from this pixel on, enlarged to the picture's own size; pixels stay pixels.

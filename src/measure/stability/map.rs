@@ -65,7 +65,7 @@ const POINTS: usize = 600;
 const PLACES: usize = 64;
 const BESIDE: f64 = 1.5;
 /// Farthest that a point is judged from, in pixels: half of one along two axes; and one place for where the places lie.
-const FARTHEST: f64 = 0.707_107 + 2.0 * BESIDE / PLACES as f64;
+const FARTHEST: f64 = std::f64::consts::FRAC_1_SQRT_2 + 2.0 * BESIDE / PLACES as f64;
 /// A picture that differs from that of the largest map by no more FLIP is as good: a quarter of what the chart's reference pictures are known to
 /// (measure.md §3).
 pub const ENOUGH: f64 = 0.001;

@@ -137,7 +137,7 @@ mod tests {
             };
             let scene = Progressive::new(&grid, &occlusion, [&empty, &slab]);
             let count = scene.directions();
-            assert_eq!(count, rays.count() as usize);
+            assert_eq!(count, rays.count());
             for kind in [Kind::Rolling, Kind::Restart] {
                 let seen = scene.run(kind, count + 3, &[grid.index([4, 4, 5])]);
                 assert!(seen[count - 1].error < 1e-12 && seen[0].error > 0.01, "{kind:?} {rays:?}");
