@@ -75,7 +75,9 @@ fn a_scene_in_units_of_a_power_of_two_is_the_same_to_the_bit() {
     let gpu = open();
     for method in methods() {
         let (ambient, opacity, image) = shown(&gpu, method, 1.0);
-        assert!(ambient.iter().any(|a| *a < 0.5) && opacity.iter().any(|a| *a > 0.5));
+        // Means of neighbourhoods are nowhere as dark as rays are.
+        let dark = if [Method::Lao, Method::Cao, Method::Rays].contains(&method) { 0.5 } else { 0.9 };
+        assert!(ambient.iter().any(|a| *a < dark) && opacity.iter().any(|a| *a > 0.5), "{}", method.name());
         assert!(image.colour.iter().all(|eye| eye.iter().filter(|p| p[3] > 0.5).count() > 200));
         // From 2 pm to a thousand kilometres.
         for power in [-29, -20, -3, 1, 13, 20, 29] {
