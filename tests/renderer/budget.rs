@@ -269,7 +269,11 @@ fn edits_in_every_frame_do_not_keep_an_update_from_its_end() {
             calm += 1;
         }
         assert!(calm <= 8, "{}: {calm}", method.name());
-        let voxel = if [Method::Lao, Method::Cao].contains(&method) { 4 } else { 2 };
+        let voxel = match method {
+            Method::FeatureDriven => 8,
+            Method::Lao | Method::Cao => 4,
+            _ => 2,
+        };
         let (volume, bytes) = (40 * 32 * 36 * voxel, second_volume(&gpu));
         assert!((volume..2 * volume).contains(&bytes), "{}: {bytes} of {volume}", method.name());
         for _ in 0..90 {

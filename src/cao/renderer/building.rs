@@ -95,7 +95,7 @@ impl Renderer {
     /// volume full of bricks to compute would take.
     ///
     /// The other rules are those of [`Self::record_update`]. A second volume of the form of V_AO is allocated when a first update spans frames, and
-    /// given back after 90 calls without anything to do: 2 bytes a voxel, with methods `lao` and `cao` 4.
+    /// given back after 90 calls without anything to do: 2 bytes a voxel, with methods `lao` and `cao` 4, with `fdao` 8.
     ///
     /// # Errors
     /// A budget of 0 bricks, of no time or of no number; those of [`Self::record_update`].
