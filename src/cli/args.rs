@@ -109,8 +109,12 @@ pub struct Parts {
     /// Names and colours of its labels: lines of text, label name r g b, 0 to 255, or label descriptions of ITK-SNAP
     #[arg(long, value_name = "FILE", requires = "label")]
     pub label_table: Option<PathBuf>,
-    /// Features by a TOML file with the key label and tables feature; a scene file is one [default: those of the scene]
-    #[arg(long, value_name = "FILE.toml")]
+    /// Parts by a file.
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        help = "Features by a TOML file with the keys label and [[feature]]; a scene file is one [default: those of the scene]"
+    )]
     pub features: Option<PathBuf>,
 }
 

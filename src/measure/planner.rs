@@ -108,6 +108,8 @@ pub fn candidates(
 ) -> Vec<Candidate> {
     let chosen = |entry: &&Entry| match method {
         Some(only) => entry.method == only,
+        // What one feature takes from another's light is no error of theirs: such values are for who asks for them.
+        None if entry.method == Method::FeatureDriven => setup.method == entry.method,
         None => stands_for(entry.same_values_as, setup.method) == entry.method,
     };
     let mut list = Vec::new();

@@ -238,8 +238,8 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         renderer.update(&mut |_| ()).unwrap();
         let hidden = state(&renderer);
         assert!(hidden.0 != before.0 && hidden.1 != before.1, "{}", method.name());
-        if method.entry().contextual && method.values() == method {
-            // A ball of 6 mm and what is within 6 mm of it, in whole bricks, of a volume of 48 mm.
+        if [Method::Rays, Method::FeatureDriven].contains(&method) {
+            // A ball of 6 mm and what is within 6 mm of it, in whole bricks, of a volume of 48 mm; boxes, cubes and cones reach farther.
             let found = renderer.categories().unwrap();
             let computed = found.affected as f64 / volume.len() as f64;
             assert!(computed > 0.02 && computed < 0.5, "{}: {computed}", method.name());

@@ -168,7 +168,8 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
 fn no_frame_shows_a_torn_volume_and_what_settles_is_exact() {
     let gpu = open();
     for (case, method) in methods().enumerate() {
-        let count = if method == Method::default() { 500 } else { 250 };
+        let (count, [enough, often]) =
+            if method == Method::default() { (500, [10, 40]) } else { (160, [4, 15]) };
         let name = NAMES[case % NAMES.len()];
         // In a volume of few bricks hardly an update of a quick method spans frames.
         let large = |seed: &u64| {
@@ -179,7 +180,8 @@ fn no_frame_shows_a_torn_volume_and_what_settles_is_exact() {
         let found = frames(&gpu, name, method, seed, count);
         // All of it happened.
         let Seen { whole, spanned, behind, settled } = found;
-        assert!(whole > 10 && spanned > 10 && behind > 40 && settled > 20, "{}: {found:?}", method.name());
+        let all = whole > enough && spanned > enough && behind > often && settled > 2 * enough;
+        assert!(all, "{}: {found:?}", method.name());
     }
     close(gpu);
 }
