@@ -97,7 +97,9 @@ pub fn scenes(plan: &Plan, files: Vec<(String, Volume)>) -> Result<Vec<Scene>> {
                     (name.to_owned(), builtin_box(name, dims, [1.0; 3])?)
                 }
             };
-            let opacity = TransferFunction::preset("auto", volume.range())?.opacity;
+            // Of the phantom with skin the bones.
+            let preset = if name == "skeleton" { "ct-bone" } else { "auto" };
+            let opacity = TransferFunction::preset(preset, volume.range())?.opacity;
             let colour = vec![[volume.range().0 as f32, ONE[0], ONE[1], ONE[2]]];
             let transfer = TransferFunction::new(opacity, colour, None)?;
             let radius_mm = samples as f32 / plan.divide as f32 * volume.min_spacing() as f32;
