@@ -3,7 +3,7 @@
 //!
 //! Volumes are phantoms of the printed sizes (1 mm voxels, one colour), or files. The clip's size is found by bisection so that category b has the printed
 //! share. As in the paper every voxel has a value, by eq. (2) with 6, 14, 26 and 54 equal rays and N = 32. On a software driver edges and radii are
-//! a quarter of the printed ones. Memory: two contenders of [`VOXEL`] bytes a voxel. Cost: what [`estimate`] says.
+//! a quarter of the printed ones. Memory: two contenders of 24 bytes a voxel. Cost: what [`estimate`] says.
 
 use super::looks::{Apart, Looks};
 use super::report::{data, inline, page, section};
