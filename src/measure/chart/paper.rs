@@ -3,7 +3,7 @@
 //!
 //! Volumes are phantoms of the printed sizes (1 mm voxels, one colour), or files. The clip's size is found by bisection so that category b has the printed
 //! share. As in the paper every voxel has a value, by eq. (2) with 6, 14, 26 and 54 equal rays and N = 32. On a software driver edges and radii are
-//! a quarter of the printed ones. Memory: two contenders of [`VOXEL`] bytes a voxel. Cost: what [`estimate`] says.
+//! a quarter of the printed ones. Memory: two contenders of 24 bytes a voxel. Cost: what [`estimate`] says.
 
 use super::looks::{Apart, Looks};
 use super::report::{data, inline, page, section};
@@ -97,7 +97,9 @@ pub fn scenes(plan: &Plan, files: Vec<(String, Volume)>) -> Result<Vec<Scene>> {
                     (name.to_owned(), builtin_box(name, dims, [1.0; 3])?)
                 }
             };
-            let opacity = TransferFunction::preset("auto", volume.range())?.opacity;
+            // Of the phantom with skin the bones.
+            let preset = if name == "skeleton" { "ct-bone" } else { "auto" };
+            let opacity = TransferFunction::preset(preset, volume.range())?.opacity;
             let colour = vec![[volume.range().0 as f32, ONE[0], ONE[1], ONE[2]]];
             let transfer = TransferFunction::new(opacity, colour, None)?;
             let radius_mm = samples as f32 / plan.divide as f32 * volume.min_spacing() as f32;
