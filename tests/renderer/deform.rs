@@ -10,7 +10,7 @@ use cao_model::methods::Method;
 use cao_model::settings::{MapSettings, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_testing::meshes::join;
-use cao_testing::{concave, convex, methods, row_of_boxes};
+use cao_testing::{concave, convex, kinds, row_of_boxes};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -55,7 +55,7 @@ fn assert_same(renderer: &Renderer, other: &Renderer, context: &str) {
 fn meshes_of_another_form_in_every_frame_are_made_by_what_is_recorded() {
     let gpu = cao_testing::open();
     let (one, other) = (concave(), convex());
-    for method in methods() {
+    for method in kinds() {
         let (mut hosted, mut opacities) = (renderer(&gpu, method, 4), Vec::new());
         for frame in 0..6 {
             let form = deformed(&one, frame as f32);
@@ -106,7 +106,7 @@ fn meshes_of_another_form_in_every_frame_are_made_by_what_is_recorded() {
 #[test]
 fn a_mesh_with_too_few_pairs_is_refused_when_the_device_knows() {
     let gpu = cao_testing::open();
-    for method in methods() {
+    for method in kinds() {
         let (mut hosted, mut own) = (renderer(&gpu, method, 2), renderer(&gpu, method, 2));
         let good = [clip(&convex(), Mode::Remove, 1.0, 6.0)];
         let row = Arc::new(row_of_boxes(3));
@@ -145,7 +145,7 @@ fn a_mesh_of_many_surfaces_gets_more_passes() {
     let cube = TriangleMesh::cuboid();
     let parts: Vec<_> = (0..30).map(|i| (&cube, 0.5, Vec3::Z * (i - 15) as f32, i % 2 == 1)).collect();
     let row = Arc::new(join(&parts));
-    for method in methods() {
+    for method in kinds() {
         let (mut hosted, mut own) = (renderer(&gpu, method, 1), renderer(&gpu, method, 1));
         let at = |form: &Arc<TriangleMesh>| {
             let mut clip = clip(form, Mode::Remove, 0.0, 1.0);
@@ -183,7 +183,7 @@ fn a_mesh_of_many_surfaces_gets_more_passes() {
 fn frames_in_flight_have_forms_of_their_own() {
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
-    for method in methods() {
+    for method in kinds() {
         let mut hosted = renderer(&gpu, method, 4);
         let forms = [0.0, 1.0, 2.5].map(|phase| [clip(&deformed(&concave(), phase), Mode::Remove, 1.0, 6.0)]);
         let mut record = |clips: &[Clip]| {

@@ -11,7 +11,7 @@ use cao_model::settings::{MapSettings, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 
-use cao_testing::methods;
+use cao_testing::{kinds, methods};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ fn another_scale_of_a_clip_mesh_draws_no_layers() {
         [clip]
     };
     let form = Vec3::new(4.0, 6.0, 5.0);
-    for method in methods() {
+    for method in kinds() {
         let mut r = renderer(&gpu, method);
         // Which maps this clip asks for.
         let mut made = |clips: &[Clip]| {

@@ -142,12 +142,13 @@ fn frames(host: &Host, gpu: &Gpu, name: &str, method: Method, seed: u64, frames:
 
 #[test]
 fn any_sequence_of_recorded_frames_is_that_of_a_fresh_renderer() {
-    const FRAMES: usize = 200;
+    const FRAMES: [usize; 2] = [200, 50];
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
     for (case, method) in methods().enumerate() {
-        let compared = frames(&host, &gpu, NAMES[case % NAMES.len()], method, 81 + case as u64, FRAMES);
-        assert!(compared > FRAMES / 10, "{}: {compared}", method.name());
+        let count = FRAMES[usize::from(!kinds().contains(&method))];
+        let compared = frames(&host, &gpu, NAMES[case % NAMES.len()], method, 81 + case as u64, count);
+        assert!(compared > count / 15, "{}: {compared}", method.name());
     }
     assert_eq!(gpu.memory_report(), []);
     drop(gpu);

@@ -33,6 +33,12 @@ pub fn methods() -> impl Iterator<Item = Method> {
     METHODS.iter().rev().map(|entry| entry.method)
 }
 
+/// One for each way to take clips in, the default first: by brick, where all methods share every line of it, and by the paper's dilation maps. For
+/// tests of what clip meshes need, and for the longest histories, of which other methods have shorter ones.
+pub fn kinds() -> [Method; 3] {
+    [Method::Rays, Method::Cao, Method::Lao]
+}
+
 /// Whether devices that tests open are under validation: unless `CAO_VALIDATION=0` says that there is no layer here.
 pub fn validated() -> bool {
     std::env::var_os("CAO_VALIDATION").is_none_or(|value| value != "0")

@@ -108,7 +108,10 @@ fn an_update_that_failed_is_done_anew() {
         failing.update(&mut |_| ()).unwrap();
         let mut failures = 0;
         for place in 0..8 {
-            for way in [Way::Run, Way::Recorded, Way::Within] {
+            // All of them of one method by brick, each in turn of those that share its updates.
+            let ways = [Way::Run, Way::Recorded, Way::Within];
+            let shares = ![Method::Rays, Method::Cao, Method::Lao].contains(&entry.method);
+            for &way in if shares { &ways[place % 3..=place % 3] } else { &ways[..] } {
                 let clips = clips(place as f32 + 0.25 * way as i32 as f32);
                 failing.set_clips(&clips).unwrap();
                 at.store(place, Ordering::Relaxed);
@@ -134,7 +137,8 @@ fn an_update_that_failed_is_done_anew() {
             }
         }
         // Before each of three parts at least, and behind the last, where it is reached.
-        assert!(failures >= 11, "{}: {failures}", entry.name);
+        let least = if [Method::Rays, Method::Cao, Method::Lao].contains(&entry.method) { 11 } else { 4 };
+        assert!(failures >= least, "{}: {failures}", entry.name);
     }
     close(gpu);
 }
