@@ -1,6 +1,7 @@
 //! The kernel `fdao` against its twin: bit for bit where a rule of rays is whole numbers only, closely where it filters; and against the
 //! kernel `rays`, whose values it has where all matter is of one feature.
 
+use crate::rays::of_opaque_cells;
 use cao::drive::Take;
 use cao::features::fdao::{self, Fdao, Rule};
 use cao::field::Field;
@@ -159,7 +160,10 @@ fn every_rule_equals_its_twin_in_any_order() {
                     let rounded = if combine == Combine::Neighbours { ROUNDED } else { 0 };
                     let allowed = match exact {
                         true => f64::from(rounded) / 65535.0,
-                        false => DARK + OF_FILTER * filter_error(&state.gpu),
+                        false => {
+                            let cells = occlusion.samples(grid.min_spacing());
+                            DARK + OF_FILTER * filter_error(&state.gpu) + of_opaque_cells(&state.gpu, cells)
+                        }
                     };
                     assert!(
                         error <= allowed,

@@ -237,7 +237,10 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         renderer.set_features(features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let hidden = state(&renderer);
-        assert!(hidden.0 != before.0 && hidden.1 != before.1, "{}", method.name());
+        let [seen, shaded] = [hidden.0 != before.0, hidden.1 != before.1];
+        // Histograms of values know nothing of features.
+        let all = if method == Method::Histograms { seen || shaded } else { seen && shaded };
+        assert!(all, "{}", method.name());
         if [Method::Rays, Method::FeatureDriven].contains(&method) {
             // A ball of 6 mm and what is within 6 mm of it, in whole bricks, of a volume of 48 mm; boxes, cubes and cones reach farther.
             let found = renderer.categories().unwrap();

@@ -24,7 +24,7 @@ const OF_FILTER: [f64; 2] = [3.0, 0.1];
 
 /// What comes through the first half of an opaque cell if the filter says that it is not quite: its opacity is a square root, its mean
 /// 1 over the logarithm of that, which for filters of 1/256 voxel is a third of the cell. It shows in rays of a cell or two.
-fn of_opaque_cells(gpu: &Gpu, cells: u32) -> f64 {
+pub fn of_opaque_cells(gpu: &Gpu, cells: u32) -> f64 {
     match gpu.info().kind {
         DeviceKind::Cpu => 0.0,
         _ => 2.0 / -filter_error(gpu).ln() / f64::from(2 * cells.max(1) - 1),

@@ -82,11 +82,15 @@ fn check_method(method: &Value, name: &str, table: &Table) {
         let wall = table.number(row, "frame_ms");
         assert!(sum >= wall - 1e-3 && sum < 1.1 * wall + 0.1, "{name}: {sum} of {wall}");
     }
-    let by_brick = ["spao", "cones", "rays"].contains(&name);
+    let by_brick = !["solid", "lao", "cao", "cao-literal"].contains(&name);
     let rule = match name {
+        "sat" => "box",
+        "shells" => "mean",
+        "vicinity" => "visible",
+        "histograms" => "histogram",
         "spao" => "product",
         "cones" => "cone",
-        "rays" => "hybrid",
+        "rays" | "fdao" => "hybrid",
         _ => "left",
     };
     assert_eq!(method["quadrature"], rule);
@@ -206,7 +210,7 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid spao cones lao cao cao-literal rays, rays 6"),
+        ("method", "solid sat shells vicinity histograms fdao spao cones lao cao cao-literal rays, rays 6"),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),
