@@ -108,8 +108,11 @@ pub fn candidates(
 ) -> Vec<Candidate> {
     let chosen = |entry: &&Entry| match method {
         Some(only) => entry.method == only,
-        // What one feature takes from another's light is no error of theirs: such values are for who asks for them.
-        None if entry.method == Method::FeatureDriven => setup.method == entry.method,
+        // What one feature takes from another's light is no error of theirs, and histograms know no clip: such values are for who asks for
+        // them.
+        None if [Method::FeatureDriven, Method::Histograms].contains(&entry.method) => {
+            setup.method == entry.method
+        }
         None => stands_for(entry.same_values_as, setup.method) == entry.method,
     };
     let mut list = Vec::new();

@@ -169,7 +169,7 @@ fn no_frame_shows_a_torn_volume_and_what_settles_is_exact() {
     let gpu = open();
     for (case, method) in methods().enumerate() {
         let (count, [enough, often]) =
-            if method == Method::default() { (500, [10, 40]) } else { (160, [3, 8]) };
+            if method == Method::default() { (500, [10, 40]) } else { (160, [3, 3]) };
         let name = NAMES[case % NAMES.len()];
         // In a volume of few bricks hardly an update of a quick method spans frames.
         let large = |seed: &u64| {
