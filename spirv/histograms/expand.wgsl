@@ -30,11 +30,16 @@ struct Factors {
 #include "shared/transfer.wgsl"
 
 var<immediate> params: ExpandParams;
+// V_o, per reference length.
+@group(0) @binding(0) var opacity: texture_3d<f32>;
 @group(0) @binding(3) var<storage, read> range_of: Range;
 @group(0) @binding(4) var<storage, read_write> factors: Factors;
 @group(0) @binding(5) var<storage, read> list: BrickList;
 @group(0) @binding(6) var index: texture_3d<u32>;
 @group(0) @binding(7) var ambient: texture_storage_3d<r16unorm, write>;
+
+// Invocations of a workgroup.
+const TEAM = 128u;
 
 // Opacity of each bin.
 var<workgroup> alphas: array<f32, BINS>;
@@ -69,7 +74,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let entry = params.base + item_of_group(group);
     let listed = entry < list.count;
     let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, params.dims, lane);
+    find_solid(corner, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {

@@ -4,56 +4,23 @@
 // A workgroup calls clear_needed, mark_rows, gather, with a barrier behind each; then `found` of them are at place_of(0), place_of(1) ... in
 // any order, and the others hold 1.
 
+#include "shared/solid.wgsl"
+
 // Invocations of a workgroup.
 const TEAM = 256u;
-// Voxels of a brick.
-const VOXELS = BRICK * BRICK * BRICK;
-// Edge of a brick with the voxels around it.
-const AROUND = BRICK + 2u;
 
-// Bits x + 1 of the rows of voxels -1 ... BRICK that have opacity, y + 1 + AROUND (z + 1).
-var<workgroup> rows: array<atomic<u32>, AROUND * AROUND>;
 var<workgroup> found: atomic<u32>;
 // Voxels that need a value, two a word.
 var<workgroup> members: array<atomic<u32>, VOXELS / 2u>;
 
 fn clear_needed(lane: u32) {
-    for (var i = lane; i < AROUND * AROUND; i += TEAM) {
-        atomicStore(&rows[i], 0u);
-    }
+    clear_rows(lane);
     for (var i = lane; i < VOXELS / 2u; i += TEAM) {
         atomicStore(&members[i], 0u);
     }
     if lane == 0u {
         atomicStore(&found, 0u);
     }
-}
-
-// Of the brick whose first voxel is `corner`.
-fn mark_rows(corner: vec3<u32>, lane: u32) {
-    for (var i = lane; i < AROUND * AROUND * AROUND; i += TEAM) {
-        let place = vec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
-        // Beyond the low border it is a large number.
-        let voxel = corner + place - 1u;
-        if all(voxel < params.dims) && textureLoad(opacity, voxel, 0).r > 0.0 {
-            atomicOr(&rows[i / AROUND], 1u << place.x);
-        }
-    }
-}
-
-fn needed(local: vec3<u32>) -> bool {
-    var bits = 0u;
-    for (var z = 0u; z < 3u; z++) {
-        for (var y = 0u; y < 3u; y++) {
-            bits |= atomicLoad(&rows[local.y + y + AROUND * (local.z + z)]);
-        }
-    }
-    return (bits >> local.x & 7u) != 0u;
-}
-
-// A voxel of a brick, x fastest.
-fn inside(i: u32) -> vec3<u32> {
-    return vec3(i, i / BRICK, i / (BRICK * BRICK)) % BRICK;
 }
 
 // Nothing of a brick that is not `listed`.

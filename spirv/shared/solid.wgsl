@@ -1,13 +1,8 @@
 // Methods by brick, one workgroup a brick: which of its voxels need a value, those with opacity in their 3³. Found once for all of them,
-// as bits in workgroup memory.
+// as bits in workgroup memory. Needs the binding `opacity`, `params.dims`, and TEAM, the invocations of a workgroup.
 
 #include "shared/bricks.wgsl"
 
-// V_o, per reference length.
-@group(0) @binding(0) var opacity: texture_3d<f32>;
-
-// Invocations of a workgroup.
-const TEAM = 128u;
 // Voxels of a brick.
 const VOXELS = BRICK * BRICK * BRICK;
 // Edge of a brick with the voxels around it.
@@ -16,20 +11,29 @@ const AROUND = BRICK + 2u;
 // Bits x + 1 of the rows of voxels -1 ... BRICK that have opacity, y + 1 + AROUND (z + 1).
 var<workgroup> rows: array<atomic<u32>, AROUND * AROUND>;
 
-// Of the brick that begins at a corner. Every invocation of the workgroup calls it.
-fn find_solid(corner: vec3<u32>, dims: vec3<u32>, lane: u32) {
+fn clear_rows(lane: u32) {
     for (var i = lane; i < AROUND * AROUND; i += TEAM) {
         atomicStore(&rows[i], 0u);
     }
-    workgroupBarrier();
+}
+
+// Of the brick that begins at a corner; behind clear_rows and a barrier.
+fn mark_rows(corner: vec3<u32>, lane: u32) {
     for (var i = lane; i < AROUND * AROUND * AROUND; i += TEAM) {
         let place = vec3(i % AROUND, i / AROUND % AROUND, i / (AROUND * AROUND));
         // Beyond the low border it is a large number.
         let voxel = corner + place - 1u;
-        if all(voxel < dims) && textureLoad(opacity, voxel, 0).r > 0.0 {
+        if all(voxel < params.dims) && textureLoad(opacity, voxel, 0).r > 0.0 {
             atomicOr(&rows[i / AROUND], 1u << place.x);
         }
     }
+}
+
+// Both, with their barriers. Every invocation of the workgroup calls it.
+fn find_solid(corner: vec3<u32>, lane: u32) {
+    clear_rows(lane);
+    workgroupBarrier();
+    mark_rows(corner, lane);
     workgroupBarrier();
 }
 

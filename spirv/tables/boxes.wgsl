@@ -36,10 +36,15 @@ struct Shells {
 #include "shared/segment.wgsl"
 
 var<immediate> params: BoxesParams;
+// V_o, per reference length.
+@group(0) @binding(0) var opacity: texture_3d<f32>;
 @group(0) @binding(1) var table: texture_3d<u32>;
 @group(0) @binding(2) var<storage, read> shells: Shells;
 @group(0) @binding(3) var<storage, read> list: BrickList;
 @group(0) @binding(4) var ambient: texture_storage_3d<r16unorm, write>;
+
+// Invocations of a workgroup.
+const TEAM = 128u;
 
 // Most shells.
 const MOST_SHELLS = 64u;
@@ -110,7 +115,7 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
     let entry = params.base + item_of_group(group);
     let listed = entry < list.count;
     let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, params.dims, lane);
+    find_solid(corner, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {

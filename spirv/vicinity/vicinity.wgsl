@@ -34,9 +34,14 @@ struct Directions {
 #include "shared/parts.wgsl"
 
 var<immediate> params: VicinityParams;
+// V_o, per reference length.
+@group(0) @binding(0) var opacity: texture_3d<f32>;
 @group(0) @binding(1) var<storage, read> directions: Directions;
 @group(0) @binding(2) var<storage, read> list: BrickList;
 @group(0) @binding(3) var ambient: texture_storage_3d<r16unorm, write>;
+
+// Invocations of a workgroup.
+const TEAM = 128u;
 
 // Parts of a voxel.
 const UNIT = 65536;
@@ -110,7 +115,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let entry = params.base + item_of_group(group);
     let listed = entry < list.count;
     let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, params.dims, lane);
+    find_solid(corner, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {
