@@ -8,15 +8,17 @@ use super::{
     idle::Idle,
     info::{DeviceInfo, choose, no_device},
     memory::Memory,
+    pipeline::PipelineInner,
     validation::ValidationLog,
 };
 use crate::{Error, Result};
 use ash::vk::{self, Handle};
 use std::{
+    collections::HashMap,
     ffi::{CStr, CString},
     mem::ManuallyDrop,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError, Weak,
         atomic::{AtomicU64, Ordering},
     },
 };
@@ -85,6 +87,8 @@ pub(crate) struct Inner {
     /// What the next recording finds ready.
     pub idle: Idle,
     counts: Mutex<Counts>,
+    /// Compute pipelines that are in use, by shader (its address, for all are static) and entry point.
+    pipelines: Mutex<HashMap<(usize, String), Weak<PipelineInner>>>,
     /// What to destroy at the end; `None` for an adopted device.
     owned: Option<Owned>,
     /// The loaded library, which all function pointers point into.
@@ -466,6 +470,7 @@ impl Parts {
             physical,
             log,
             hazards: Mutex::default(),
+            pipelines: Mutex::default(),
             idle: Idle::default(),
             counts: Mutex::default(),
             owned,
@@ -485,6 +490,11 @@ impl Inner {
     /// What was asked of Vulkan so far.
     pub fn counts(&self) -> MutexGuard<'_, Counts> {
         self.counts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Compute pipelines that are in use.
+    pub fn pipelines(&self) -> MutexGuard<'_, HashMap<(usize, String), Weak<PipelineInner>>> {
+        self.pipelines.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A number that no other resource of any device has or had.

@@ -10,7 +10,10 @@ use super::{
 };
 use crate::{Error, Result};
 use ash::vk;
-use std::{ffi::CString, sync::Arc};
+use std::{
+    ffi::CString,
+    sync::{Arc, Weak},
+};
 
 /// A compute or graphics pipeline.
 pub struct Pipeline(pub(crate) Arc<PipelineInner>);
@@ -118,7 +121,7 @@ pub enum Blend {
 }
 
 impl Gpu {
-    /// A compute pipeline of one entry point.
+    /// A compute pipeline of one entry point; while one is in use, that one: drivers compile for long, some at first use only.
     ///
     /// # Errors
     /// [`Error::Config`] if the shader has no such compute entry point, [`Error::Limit`] if it needs more than the device has,
@@ -126,6 +129,10 @@ impl Gpu {
     pub fn compute(&self, shader: &'static Shader, entry: &str) -> Result<Pipeline> {
         let point = entry_point(shader, entry, Stage::Compute)?;
         let gpu = &self.0;
+        let key = (std::ptr::from_ref(shader).addr(), entry.to_owned());
+        if let Some(made) = gpu.pipelines().get(&key).and_then(Weak::upgrade) {
+            return Ok(Pipeline(made));
+        }
         let name = format!("{}.{entry}", shader.name);
         let size: u32 = point.workgroup.iter().product();
         if size > gpu.info.max_invocations {
@@ -145,7 +152,9 @@ impl Gpu {
             .layout(pipeline.layout);
         // SAFETY: module and layout are alive and were made for this entry point.
         let made = unsafe { gpu.device.create_compute_pipelines(vk::PipelineCache::null(), &[create], None) };
-        pipeline.finish(made, "vkCreateComputePipelines")
+        let made = pipeline.finish(made, "vkCreateComputePipelines")?;
+        gpu.pipelines().insert(key, Arc::downgrade(&made.0));
+        Ok(made)
     }
 
     /// A graphics pipeline.

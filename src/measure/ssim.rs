@@ -62,39 +62,37 @@ fn ssim(
 ) -> f64 {
     let voxels = grid.len();
     assert_eq!((found.len(), reference.len(), counts.len()), (voxels, voxels, voxels), "voxels");
-    let moment = |of: fn(f64, f64) -> f64| {
-        let values = (0..voxels).map(|i| {
-            // What does not count may be NaN.
-            if counts[i] { of(f64::from(found[i]), f64::from(reference[i])) } else { 0.0 }
-        });
-        let mut field: Vec<f64> = values.collect();
-        axes.iter().for_each(|&axis| blur(grid, &mut field, axis));
-        field
+    let gauss: [f64; REACH + 1] = std::array::from_fn(|d| (-((d * d) as f64) / (2.0 * SIGMA * SIGMA)).exp());
+    // Each window by itself, for of a large volume a sample counts.
+    let window = |i: usize| {
+        let at = grid.voxel(i);
+        let along = |axis: usize| {
+            let reach = if axes.contains(&axis) { REACH } else { 0 };
+            (at[axis].saturating_sub(reach)..=(at[axis] + reach).min(grid.dims[axis] - 1))
+                .map(move |j| (j, gauss[j.abs_diff(at[axis])]))
+        };
+        let mut moments = [0.0; 6];
+        for (z, by_z) in along(2) {
+            for (y, by_y) in along(1) {
+                let (row, weight) = (grid.index([0, y, z]), by_y * by_z);
+                for (x, by_x) in along(0).filter(|(x, _)| counts[row + x]) {
+                    let (p, t) = (f64::from(found[row + x]), f64::from(reference[row + x]));
+                    let terms = [1.0, p, t, p * p, t * t, p * t];
+                    moments.iter_mut().zip(terms).for_each(|(sum, term)| *sum += weight * by_x * term);
+                }
+            }
+        }
+        let weight = moments[0];
+        moments.map(|sum| sum / weight)
     };
-    let weight = moment(|_, _| 1.0);
-    let (p, t) = (moment(|p, _| p), moment(|_, t| t));
-    let (pp, tt, pt) = (moment(|p, _| p * p), moment(|_, t| t * t), moment(|p, t| p * t));
     let (mut sum, mut count) = (0.0, 0);
     for i in (0..voxels).filter(|&i| counts[i]) {
-        let mean = |field: &[f64]| field[i] / weight[i];
-        let (mp, mt) = (mean(&p), mean(&t));
-        let (vp, vt, c) = (mean(&pp) - mp * mp, mean(&tt) - mt * mt, mean(&pt) - mp * mt);
+        let [_, mp, mt, pp, tt, pt] = window(i);
+        let (vp, vt, c) = (pp - mp * mp, tt - mt * mt, pt - mp * mt);
         sum += (2.0 * mp * mt + c1) * (2.0 * c + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2));
         count += 1;
     }
     sum / f64::from(count)
-}
-
-/// Weighted sum along one axis; nothing lies outside. The weights need no norm: it is that of [`ssim`]'s `weight`.
-fn blur(grid: &Grid, field: &mut Vec<f64>, axis: usize) {
-    let gauss: [f64; REACH + 1] = std::array::from_fn(|d| (-((d * d) as f64) / (2.0 * SIGMA * SIGMA)).exp());
-    let stride = grid.dims[..axis].iter().product::<usize>();
-    let blurred = (0..field.len()).map(|i| {
-        let at = i / stride % grid.dims[axis];
-        let reach = at.saturating_sub(REACH)..=(at + REACH).min(grid.dims[axis] - 1);
-        reach.map(|j| gauss[j.abs_diff(at)] * field[i + j * stride - at * stride]).sum()
-    });
-    *field = blurred.collect();
 }
 
 #[cfg(test)]
