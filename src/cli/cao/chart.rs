@@ -22,8 +22,8 @@ use std::process::ExitCode;
 const DEFAULT: [&str; 3] = ["builtin:engine:48", "builtin:fruit:48", "builtin:skeleton:48"];
 const DEFAULT_RADIUS: f32 = 8.0;
 /// The same for a first look.
-const QUICK: [&str; 3] = ["builtin:engine:32", "builtin:fruit:32", "builtin:skeleton:32"];
-const QUICK_RADIUS: f32 = 6.0;
+const QUICK: [&str; 3] = ["builtin:engine:24", "builtin:fruit:24", "builtin:skeleton:24"];
+const QUICK_RADIUS: f32 = 4.0;
 
 /// What is written.
 const FILES: [&str; 7] =
@@ -188,7 +188,7 @@ fn plan(args: &Args) -> Plan {
     Plan {
         quick: args.quick,
         runs: args.runs,
-        size: if args.quick { [192, 192] } else { [384, 384] },
+        size: if args.quick { [128, 128] } else { [384, 384] },
         pictures: if args.quick { [32, 32] } else { [128, 128] },
         reference: if args.quick { quick } else { full },
     }
