@@ -38,12 +38,12 @@ const RUNS: u32 = 2;
 /// How far off foreseen minutes may be.
 const FORESEEN: f64 = 8.0;
 
-fn scene(name: &str) -> Scene {
-    let volume = builtin(name, 18).unwrap();
+fn scene(name: &str, edge: usize) -> Scene {
+    let volume = builtin(name, edge).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let rig = StereoRig::framing(volume.size_mm(), 30.0, 25.0);
-    let state = State { clips: vec![Scene::default_clip(&volume)], transfer, radius_mm: 5.0 };
-    Scene { name: format!("builtin:{name}:18"), volume, state, rig }
+    let state = State { clips: vec![Scene::default_clip(&volume)], transfer, radius_mm: edge as f32 / 3.6 };
+    Scene { name: format!("builtin:{name}:{edge}"), volume, state, rig }
 }
 
 fn plan() -> Plan {
@@ -56,7 +56,7 @@ fn plan() -> Plan {
 fn every_method_is_charted_and_what_the_chart_says_holds() {
     let gpu = open();
     let mut shares = Vec::new();
-    let scenes = [scene("engine"), scene("fruit")];
+    let scenes = [scene("engine", 18), scene("fruit", 16)];
     let foreseen = foresee(&gpu, &scenes, &plan()).unwrap();
     let start = Instant::now();
     let chart = measure(&gpu, &scenes, &plan(), &mut |_, share| shares.push(share)).unwrap();
@@ -174,7 +174,7 @@ fn the_picture_is_drawn_in_every_way_and_more_work_errs_less(chart: &Chart) {
 #[test]
 fn a_picture_with_a_fault_is_far_off_the_front() {
     let gpu = open();
-    let scene = scene("engine");
+    let scene = scene("engine", 18);
     let setup = Setup::of(Method::default(), 1.0);
     let mut renderer =
         Renderer::new(&gpu, &scene.volume, scene.state.transfer.clone(), setup, COLOUR).unwrap();
@@ -262,7 +262,7 @@ fn every_run_of_every_method_and_change_is_a_record_whose_parts_fit_together(cha
     let number = |record: &BTreeMap<String, String>, name: &str| -> f64 {
         record[name].parse().unwrap_or_else(|_| panic!("{name}: {:?}", record[name]))
     };
-    for scene in ["builtin:engine:18", "builtin:fruit:18"] {
+    for scene in ["builtin:engine:18", "builtin:fruit:16"] {
         for change in Change::ALL.map(Change::name) {
             for method in METHODS {
                 let own: Vec<_> = records
@@ -377,7 +377,7 @@ fn drawings_are_well_formed_and_show_every_method_and_change(chart: &Chart) {
     let svg = drawing.svg();
     well_formed(&svg).unwrap();
     for text in
-        METHODS.into_iter().chain(Change::ALL.map(Change::name)).chain(["builtin:fruit:18", "26 rays"])
+        METHODS.into_iter().chain(Change::ALL.map(Change::name)).chain(["builtin:fruit:16", "26 rays"])
     {
         assert!(svg.contains(text), "{text}");
     }
@@ -431,14 +431,14 @@ fn the_report_stands_alone_and_has_every_part(chart: &Chart) {
 #[test]
 fn a_scene_that_shows_nothing_or_a_plan_that_measures_nothing_is_refused_by_name() {
     let gpu = open();
-    let mut nothing = scene("engine");
+    let mut nothing = scene("engine", 18);
     nothing.state.transfer.opacity.iter_mut().for_each(|point| point[1] = 0.0);
     let refused = |scene: &Scene, plan: &Plan| {
         measure(&gpu, std::slice::from_ref(scene), plan, &mut |_, _| ()).unwrap_err().to_string()
     };
     let said = refused(&nothing, &plan());
     assert!(said.contains("builtin:engine:18") && said.contains("no voxel has opacity"), "{said}");
-    let said = refused(&scene("engine"), &Plan { runs: 0, ..plan() });
+    let said = refused(&scene("engine", 18), &Plan { runs: 0, ..plan() });
     assert!(said.contains("0 runs"), "{said}");
     close(gpu);
     let said = Peers::parse("{\"machine\": 3}").unwrap_err().to_string();

@@ -554,6 +554,8 @@ struct Stand<'a> {
 /// What is known of one state.
 struct Known {
     reference: Reference,
+    /// Voxels at which it is known.
+    computed: Vec<usize>,
     /// Of every so many pixels along both edges of the image the surface is known.
     stride: usize,
     /// Points of the surface in the left eye's image: index coordinates, pixel, ambient value.
@@ -596,7 +598,8 @@ impl<'a> Stand<'a> {
         let values =
             reference::ambient_at(gpu, &grid, &opacity, &points, radius, offset, length, plan, quiet)?;
         let surface = shown.into_iter().zip(values).map(|((point, pixel), value)| (point, pixel, value));
-        Ok(Known { reference, stride, surface: surface.collect() })
+        let computed = (0..grid.len()).filter(|&i| reference.counts[i]).collect();
+        Ok(Known { reference, computed, stride, surface: surface.collect() })
     }
 
     /// Categories after the clips moved, and the share of the voxels with a value that was recomputed for it.
@@ -648,7 +651,7 @@ impl Known {
     fn summary(&self) -> Truth {
         Truth {
             counting: self.reference.counting,
-            computed: self.reference.counts.iter().filter(|c| **c).count(),
+            computed: self.computed.len(),
             surface: self.surface.len(),
             convergence: self.reference.convergence.rmse,
         }
@@ -656,29 +659,29 @@ impl Known {
 
     /// A contender's errors, its runs still to come.
     fn judge(&self, scene: &Scene, arena: Arena, entry: &Entrant, change: Change, found: &Values) -> Point {
-        let (of_surface, expected);
-        let (found, reference, counts, ssim_3d) = match found {
+        let pairs: (Vec<f32>, Vec<f32>);
+        let mut ssim = None;
+        match found {
             Values::Voxels(values) => {
                 let Reference { ambient, counts, .. } = &self.reference;
-                let ssim = ssim_3d(&scene.grid(), values, ambient, counts, Constants::PRINTED);
-                (values, ambient, counts.clone(), Some(ssim))
+                ssim = Some(ssim_3d(&scene.grid(), values, ambient, counts, Constants::PRINTED));
+                pairs = self.computed.iter().map(|&voxel| (values[voxel], ambient[voxel])).unzip();
             }
             Values::Pixels(values) => {
                 debug_assert_eq!(values.len(), (arena.size[0] * arena.size[1]) as usize);
-                of_surface = self.surface.iter().map(|(_, pixel, _)| values[*pixel]).collect::<Vec<f32>>();
-                expected = self.surface.iter().map(|(.., value)| *value).collect::<Vec<f32>>();
-                let counts = vec![true; expected.len()];
-                (&of_surface, &expected, counts, None)
+                pairs = self.surface.iter().map(|&(_, pixel, value)| (values[pixel], value)).unzip();
             }
-        };
+        }
+        let (found, reference) = pairs;
+        let counts = vec![true; found.len()];
         Point {
             method: entry.method,
             setting: entry.setting.clone(),
             change,
-            on_surface: ssim_3d.is_none(),
-            errors: errors(found, reference, &counts),
-            shape: shape_errors(found, reference, &counts).0,
-            ssim_3d,
+            on_surface: ssim.is_none(),
+            errors: errors(&found, &reference, &counts),
+            shape: shape_errors(&found, &reference, &counts).0,
+            ssim_3d: ssim,
             runs: Vec::new(),
         }
     }
