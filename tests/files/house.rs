@@ -598,8 +598,9 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 8] = [
+const WITHOUT_TWIN: [(&str, &str); 9] = [
     ("labels", "copies features; the test has which bricks they change in"),
+    ("mask", "copies opacities of a feature; the test has which, where"),
     ("filter", "asks a device what its filter does; the answer is in the comparison"),
     ("commit", "counts and copies bricks; the test has what whole updates make of them"),
     ("ones", "writes ones; the test has them"),
