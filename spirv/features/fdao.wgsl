@@ -43,7 +43,8 @@ var<immediate> params: FdaoParams;
 @group(0) @binding(4) var<storage, read> list: BrickList;
 // feature of each voxel, from 1 on, 0 where it has none
 @group(0) @binding(5) var labels: texture_3d<u32>;
-// of `CHANNELS` A_k in channel k - 1; of the other rules the voxel's value in all, but of `NEIGHBOURS` sums until the last pass
+// of `CHANNELS` A_k in channel k - 1; of the other rules the voxel's value in all. Until the last pass notes: of
+// `OWN` whose voxel it is, of `NEIGHBOURS` sums
 @group(0) @binding(6) var ambient: texture_storage_3d<rgba16unorm, read_write>;
 // V_o
 @group(0) @binding(7) var matter: texture_3d<f32>;
@@ -70,8 +71,6 @@ const WIDE_VOXELS = AROUND * AROUND * AROUND;
 // Voxels beyond a ray's reach whose matter it may interpolate, and one for the sampler's rounding.
 const BESIDE = 2u;
 
-// Rows of voxels that have any opacity, as `rows` of those that have some of the feature.
-var<workgroup> solid_rows: array<atomic<u32>, AROUND * AROUND>;
 // Whether matter of the feature is within reach.
 var<workgroup> near: atomic<u32>;
 var<workgroup> found: atomic<u32>;
@@ -111,31 +110,30 @@ fn look_around(corner: vec3<u32>, lane: u32) {
     }
 }
 
-// Rows that have any opacity.
-fn mark_solid(corner: vec3<u32>, lane: u32) {
+// Rows of what voxels need a value for: the matter of the feature, or all of it.
+fn mark_what_counts(corner: vec3<u32>, lane: u32) {
+    if params.combine == ALL || params.combine == CHANNELS {
+        mark_rows(corner, lane);
+        return;
+    }
     for (var i = lane; i < WIDE_VOXELS; i += TEAM) {
         let voxel = corner + around(i) - 1u;
         if all(voxel < params.dims) && matter_at(voxel) > 0.0 {
-            atomicOr(&solid_rows[i / AROUND], 1u << (i % AROUND));
+            atomicOr(&rows[i / AROUND], 1u << (i % AROUND));
         }
     }
 }
 
-// Whether a voxel of the brick needs a value of some feature.
-fn shown(local: vec3<u32>) -> bool {
-    var bits = params.unneeded * 7u;
-    for (var n = 0u; n < 9u; n++) {
-        bits |= atomicLoad(&solid_rows[local.y + n % 3u + AROUND * (local.z + n / 3u)]) >> local.x;
-    }
-    return (bits & 7u) != 0u;
+// Whether a voxel of the brick needs a value.
+fn wants(local: vec3<u32>) -> bool {
+    return params.unneeded == 1u || needed(local);
 }
 
-// Whether a voxel of the brick takes the feature's value: it is its own, or it has none and the most opaque neighbour is the feature's; of equal
-// ones the lowest feature counts.
-fn takes_it(voxel: vec3<u32>, local: vec3<u32>) -> bool {
+// The feature whose value a voxel takes: its own; without one that of its most opaque neighbour, of equal ones the lowest. 0: none.
+fn own_of(voxel: vec3<u32>) -> u32 {
     let own = feature_of(voxel);
-    if own != 0u || !needed(local) {
-        return own == params.feature;
+    if own != 0u {
+        return own;
     }
     var best = 0u;
     var most = 0.0;
@@ -150,26 +148,33 @@ fn takes_it(voxel: vec3<u32>, local: vec3<u32>) -> bool {
             }
         }
     }
-    return best == params.feature;
+    return best;
+}
+
+// The same of a voxel of the brick by the first pass, which notes in V_AO whose pass will have the value. 0: nobody's, or it is there.
+fn owner(voxel: vec3<u32>, local: vec3<u32>) -> u32 {
+    if params.feature == 1u {
+        var own = 0u;
+        if wants(local) {
+            own = own_of(voxel);
+        }
+        if own != 1u {
+            textureStore(ambient, voxel, select(vec4(f32(own) / PARTS, 1.0, 1.0, 1.0), vec4(1.0), own == 0u));
+        }
+        return own;
+    }
+    let texel = textureLoad(ambient, voxel);
+    // A value is the same in all channels.
+    return select(0u, u32(round(texel.x * PARTS)), texel.x < texel.y);
 }
 
 // Whether the rule asks for the feature's value in a voxel, in the brick or beside it.
 fn asked(voxel: vec3<u32>, local: vec3<u32>) -> bool {
-    switch params.combine {
-        case OWN: {
-            return shown(local) && takes_it(voxel, local);
-        }
-        case NEIGHBOURS: {
-            let inside = all(local < vec3(BRICK));
-            return feature_of(voxel) == params.feature && (matter_at(voxel) > 0.0 || (inside && shown(local)));
-        }
-        case MOST: {
-            return shown(local);
-        }
-        default: {
-            return params.unneeded == 1u || needed(local);
-        }
+    if params.combine == NEIGHBOURS {
+        let inside = all(local < vec3(BRICK));
+        return feature_of(voxel) == params.feature && (matter_at(voxel) > 0.0 || (inside && wants(local)));
     }
+    return wants(local);
 }
 
 fn put(voxel: vec3<u32>, value: u32) {
@@ -184,6 +189,11 @@ fn before(voxel: vec3<u32>) -> vec4<f32> {
     return textureLoad(ambient, voxel);
 }
 
+fn join(place: u32) {
+    let slot = atomicAdd(&found, 1u);
+    atomicOr(&members[slot >> 1u], place << ((slot & 1u) * 16u));
+}
+
 // Puts the voxels that are asked for on the list of the group; others hold 1 if no later pass says more.
 fn gather(corner: vec3<u32>, listed: bool, lane: u32) {
     let wide = params.combine == NEIGHBOURS;
@@ -192,13 +202,21 @@ fn gather(corner: vec3<u32>, listed: bool, lane: u32) {
         // Before the brick a place is a large number.
         let local = select(inside(i), around(i) - 1u, vec3(wide));
         let voxel = corner + local;
-        if listed && all(voxel < params.dims) {
-            if near_it && asked(voxel, local) {
-                let slot = atomicAdd(&found, 1u);
-                atomicOr(&members[slot >> 1u], place_of(local + 1u) << ((slot & 1u) * 16u));
-            } else if !wide && params.feature == 1u {
-                put(voxel, WHOLE);
+        if !(listed && all(voxel < params.dims)) {
+            continue;
+        }
+        if params.combine == OWN {
+            if owner(voxel, local) == params.feature {
+                if near_it {
+                    join(place_of(local + 1u));
+                } else {
+                    put(voxel, WHOLE);
+                }
             }
+        } else if near_it && asked(voxel, local) {
+            join(place_of(local + 1u));
+        } else if !wide && params.feature == 1u {
+            put(voxel, WHOLE);
         }
     }
 }
@@ -292,9 +310,6 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
         }
     }
     clear_rows(lane);
-    for (var i = lane; i < AROUND * AROUND; i += TEAM) {
-        atomicStore(&solid_rows[i], 0u);
-    }
     let all_matter = params.combine == ALL;
     if lane == 0u {
         atomicStore(&near, u32(all_matter));
@@ -305,11 +320,9 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
         look_around(corner, lane);
     }
     workgroupBarrier();
-    if atomicLoad(&near) != 0u {
-        mark_rows(corner, lane);
-    }
-    if !all_matter && params.combine != CHANNELS {
-        mark_solid(corner, lane);
+    // Who owns which voxel the first pass has noted.
+    if params.combine != OWN || params.feature == 1u {
+        mark_what_counts(corner, lane);
     }
     workgroupBarrier();
     gather(corner, listed, lane);
@@ -337,7 +350,7 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
     for (var i = lane; i < VOXELS; i += TEAM) {
         let local = inside(i);
         if listed && all(corner + local < params.dims) {
-            if shown(local) {
+            if wants(local) {
                 blend(corner + local, local);
             } else if params.feature == 1u {
                 put(corner + local, WHOLE);
