@@ -3,8 +3,6 @@
 
 struct LabelsParams {
     dims: vec3<u32>,
-    // 1: there are no features, and all matter is one
-    one: u32,
 }
 
 // Squared distance in mm from each brick to the nearest changed one.
@@ -39,10 +37,7 @@ fn main(
     for (var slice = 0u; slice < BRICK; slice += SLICES) {
         let voxel = corner + local + vec3(0u, 0u, slice);
         if there && all(voxel < params.dims) {
-            var now = 1u;
-            if params.one == 0u {
-                now = textureLoad(features, voxel, 0).r;
-            }
+            let now = textureLoad(features, voxel, 0).r;
             if textureLoad(labels, voxel).r != now {
                 textureStore(labels, voxel, vec4(now, 0u, 0u, 0u));
                 atomicStore(&different, 1u);

@@ -66,10 +66,16 @@ pub trait Gather: Send + Sync + Sized {
         None
     }
 
-    /// What it makes of V_o, as it is now and after these changes, before it computes values of the bricks of any list: its own volumes,
-    /// for instance. As many parts each time: an update that spans frames counts them.
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, changed: Changed) -> Vec<Part<'a>> {
-        let _ = (on, opacity, changed);
+    /// What it makes of V_o, as it is now and after these changes, in bricks with 0 in `change`, before it computes values of the bricks of any
+    /// list: its own volumes, for instance. As many parts each time: an update that spans frames counts them.
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        opacity: &'a Image,
+        change: &'a Buffer,
+        changed: Changed,
+    ) -> Vec<Part<'a>> {
+        let _ = (on, opacity, change, changed);
         Vec::new()
     }
 
@@ -292,7 +298,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         if changed.features {
             parts.extend(self.gather.changed(on, &v.change));
         }
-        parts.extend(self.gather.prepare(on, &v.opacity, changed));
+        parts.extend(self.gather.prepare(on, &v.opacity, &v.change, changed));
         parts.extend([self.choose(to, &v.todo, Self::anew(changed)), self.compute(to)]);
         parts
     }
@@ -322,7 +328,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         let list = BrickList::new(&on.gpu, &on.field)?;
         let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
         let to = self.target(on, &list, into);
-        let mut parts = self.gather.prepare(on, &v.opacity, RECOMPUTED);
+        let mut parts = self.gather.prepare(on, &v.opacity, &v.change, RECOMPUTED);
         parts.extend([self.choose(to, &todo, true), self.compute(to)]);
         let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);

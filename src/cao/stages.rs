@@ -54,6 +54,8 @@ pub const CONES: Stage = Stage::new("cones", Phase::Ambient);
 pub const RAYS: Stage = Stage::new("rays", Phase::Ambient);
 /// Which bricks have other features.
 pub const LABELS: Stage = Stage::new("labels", Phase::Ambient);
+/// Opacities of each feature.
+pub const MASK: Stage = Stage::new("mask", Phase::Ambient);
 /// Rays of features of the bricks within reach of a change.
 pub const FDAO: Stage = Stage::new("fdao", Phase::Ambient);
 /// The table of shells.

@@ -316,7 +316,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/cast/", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
-    ("src/cao/features/", &["error", "host", "stages", "drive", "field", "subject", "by_brick", "rays"]),
+    (
+        "src/cao/features/",
+        &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick", "rays"],
+    ),
     ("src/cao/pyramid/", &["error", "stages", "drive", "field"]),
     ("src/cao/spao/", &["error", "stages", "drive", "field", "subject", "ambient", "by_brick", "pyramid"]),
     ("src/cao/cones/", &["error", "stages", "drive", "field", "subject", "ambient", "by_brick", "pyramid"]),
@@ -598,8 +601,9 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 8] = [
+const WITHOUT_TWIN: [(&str, &str); 9] = [
     ("labels", "copies features; the test has which bricks they change in"),
+    ("mask", "copies opacities of a feature; the test has which, where"),
     ("filter", "asks a device what its filter does; the answer is in the comparison"),
     ("commit", "counts and copies bricks; the test has what whole updates make of them"),
     ("ones", "writes ones; the test has them"),

@@ -3,7 +3,8 @@
 
 use crate::rays::of_opaque_cells;
 use cao::drive::Take;
-use cao::features::fdao::{self, Fdao, Rule};
+use cao::features::fdao::{self, Fdao};
+use cao::features::mask::{Mask, Masked};
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::volume_image;
@@ -29,6 +30,7 @@ const ROUNDED: u16 = 1;
 struct State {
     gpu: Gpu,
     kernel: Fdao,
+    mask: Mask,
     field: Field,
 }
 
@@ -37,6 +39,7 @@ struct State {
 struct Asked<'a> {
     opacity: &'a Image,
     labels: &'a Image,
+    masked: &'a Masked,
     reference_mm: f32,
     scope: Scope,
 }
@@ -44,7 +47,24 @@ struct Asked<'a> {
 impl State {
     fn new(grid: &Grid) -> Self {
         let gpu = open();
-        Self { kernel: Fdao::new(&gpu).unwrap(), field: blank(&gpu, grid), gpu }
+        let field = blank(&gpu, grid);
+        Self { kernel: Fdao::new(&gpu).unwrap(), mask: Mask::new(&gpu, &field).unwrap(), field, gpu }
+    }
+
+    /// Another field.
+    fn take(&mut self, grid: &Grid) {
+        self.field = blank(&self.gpu, grid);
+        self.mask = Mask::new(&self.gpu, &self.field).unwrap();
+    }
+
+    /// Opacities of so many features.
+    fn masked(&self, opacity: &Image, labels: &Image, features: usize) -> Masked {
+        let masked = Masked::new(&self.gpu, &self.field, features).unwrap();
+        let change = buffer(&self.gpu, "change", &vec![0; 4 * self.field.brick_count() as usize]);
+        run(&self.gpu, |rec| {
+            self.mask.record(rec, &self.field, true, opacity, labels, &change, &masked).unwrap();
+        });
+        masked
     }
 
     fn image(&self, format: Format, content: &[u8]) -> Image {
@@ -58,12 +78,12 @@ impl State {
     }
 
     /// V_AO with 7 in what is not written.
-    fn computed(&self, plan: &RayPlan, rule: Rule, asked: Asked, bricks: &[u32]) -> Vec<[u16; 4]> {
+    fn computed(&self, plan: &RayPlan, rule: Combine, asked: Asked, bricks: &[u32]) -> Vec<[u16; 4]> {
         let voxels = self.field.dims.iter().product::<u32>() as usize;
         let ambient = self.image(Format::Rgba16Unorm, bytemuck::cast_slice(&vec![[7_u16; 4]; voxels]));
         let list = BrickList::of(&self.gpu, bricks).unwrap();
-        let Asked { opacity, labels, reference_mm, scope } = asked;
-        let b = fdao::Bindings { opacity, labels, list: &list, ambient: &ambient };
+        let Asked { opacity, labels, masked, reference_mm, scope } = asked;
+        let b = fdao::Bindings { opacity, labels, masked, list: &list, ambient: &ambient };
         run(&self.gpu, |rec| {
             self.kernel.record_directions(rec, plan).unwrap();
             let (field, all) = (&self.field, Take::All);
@@ -89,8 +109,8 @@ impl State {
     }
 
     fn close(self) {
-        let Self { gpu, kernel, field } = self;
-        drop((kernel, field));
+        let Self { gpu, kernel, mask, field } = self;
+        drop((kernel, mask, field));
         close(gpu);
     }
 }
@@ -119,7 +139,7 @@ fn every_rule_equals_its_twin_in_any_order() {
     let (mut sum, mut count, mut mixed) = (0.0, 0.0, 0);
     let mut state = State::new(&GRIDS[0]);
     for (case, grid) in GRIDS.iter().chain([&extra]).enumerate() {
-        state.field = blank(&state.gpu, grid);
+        state.take(grid);
         for (turn, (rays_of, [radius, offset, step], reference, features)) in [
             (RaySet::Spiral(10), [Some(7.0), None, None], 1.0, 3),
             (RaySet::R6, [Some(5.0), None, None], 1.0, 8),
@@ -134,6 +154,7 @@ fn every_rule_equals_its_twin_in_any_order() {
                 state.image(Format::R16Unorm, bytemuck::cast_slice(&opacity)),
                 state.image(Format::R8Uint, &labels),
             ];
+            let masked = state.masked(&images[0], &images[1], features.into());
             let scope = if random.below(2) == 0 { Scope::Needed } else { Scope::All };
             let matter = Matter { grid, opacity: &opacity, labels: &labels, features };
             for (c, combine) in RULES.into_iter().enumerate() {
@@ -147,11 +168,11 @@ fn every_rule_equals_its_twin_in_any_order() {
                     step_mm: step.map(mm),
                 };
                 let reference_mm = reference * occlusion.step(grid.min_spacing());
-                let asked = Asked { opacity: &images[0], labels: &images[1], reference_mm, scope };
+                let [opacity, labels] = &images;
+                let asked = Asked { opacity, labels, masked: &masked, reference_mm, scope };
                 let mut plan = RayPlan::new(state.field.spacing, &occlusion).unwrap();
                 let mut bricks = state.all();
-                let merged = Rule::new(combine, features.into());
-                let found = state.computed(&plan, merged, asked, &bricks);
+                let found = state.computed(&plan, combine, asked, &bricks);
                 let expected = fdao(matter, &occlusion, reference_mm, combine, scope == Scope::All);
                 let exact = rule == Quadrature::Nearest && reference == 1.0;
                 for (i, (f, e)) in found.iter().zip(&expected).enumerate() {
@@ -177,7 +198,7 @@ fn every_rule_equals_its_twin_in_any_order() {
                 plan.directions.reverse();
                 assert_eq!(
                     found,
-                    state.computed(&plan, merged, asked, &bricks),
+                    state.computed(&plan, combine, asked, &bricks),
                     "list and directions reversed"
                 );
             }
@@ -198,6 +219,7 @@ fn one_feature_has_the_values_of_rays_by_brick() {
     let opacity = state.image(Format::R16Unorm, bytemuck::cast_slice(&opacity));
     let one = state.image(Format::R8Uint, &vec![1; grid.len()]);
     let two = state.image(Format::R8Uint, &two);
+    let masks = [state.masked(&opacity, &one, 1), state.masked(&opacity, &two, 2)];
     for quadrature in Quadrature::BRICK {
         let occlusion = Occlusion {
             rays: RaySet::Spiral(20),
@@ -207,17 +229,21 @@ fn one_feature_has_the_values_of_rays_by_brick() {
             step_mm: None,
         };
         let plan = RayPlan::new(state.field.spacing, &occlusion).unwrap();
-        let asked = |labels| Asked { opacity: &opacity, labels, reference_mm: 1.1, scope: Scope::Needed };
-        let all = state.of_all_matter(&rays, &plan, asked(&one));
+        let asked = |labels, masked| {
+            let (reference_mm, scope) = (1.1, Scope::Needed);
+            Asked { opacity: &opacity, labels, masked, reference_mm, scope }
+        };
+        let [of_one, of_two] = [asked(&one, &masks[0]), asked(&two, &masks[1])];
+        let all = state.of_all_matter(&rays, &plan, of_one);
         for combine in RULES {
-            let least = |labels, features| -> Vec<u16> {
-                let found = state.computed(&plan, Rule::new(combine, features), asked(labels), &state.all());
+            let least = |asked| -> Vec<u16> {
+                let found = state.computed(&plan, combine, asked, &state.all());
                 found.into_iter().map(|v| v.into_iter().min().unwrap()).collect()
             };
-            assert_eq!(least(&one, 1), all, "{quadrature:?} {combine:?}");
-            assert_ne!(least(&two, 2), all, "{quadrature:?} {combine:?}");
+            assert_eq!(least(of_one), all, "{quadrature:?} {combine:?}");
+            assert_ne!(least(of_two), all, "{quadrature:?} {combine:?}");
         }
     }
-    drop((rays, opacity, one, two));
+    drop((rays, opacity, one, two, masks));
     state.close();
 }

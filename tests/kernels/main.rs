@@ -21,6 +21,7 @@ mod histogram;
 mod labels;
 mod lao;
 mod level;
+mod mask;
 mod near;
 mod occupancy;
 mod ones;

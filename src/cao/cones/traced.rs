@@ -9,7 +9,7 @@ use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Image, Recorder, Stage};
+use cao_gpu::{Buffer, Image, Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// Mip levels, and cones through them.
@@ -62,7 +62,13 @@ impl Gather for Cones {
         }))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, _: Changed) -> Vec<Part<'a>> {
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        opacity: &'a Image,
+        _: &'a Buffer,
+        _: Changed,
+    ) -> Vec<Part<'a>> {
         self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
     }
 

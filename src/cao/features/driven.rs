@@ -1,17 +1,20 @@
 //! The method `fdao`: feature-driven ambient occlusion (fdAO §4) through rays by brick.
 //!
 //! What V_AO depends on is V_o and the feature of each voxel within reach, so a brick counts as changed where either did. Beside what
-//! [`ByBrick`](crate::by_brick::ByBrick) keeps, a byte a voxel of features and six more of V_AO, which has four channels.
+//! [`ByBrick`](crate::by_brick::ByBrick) keeps, a byte a voxel of features, six more of V_AO, which has four channels, and two for each
+//! feature, its V_o,k. Without features all matter is one, and there is no V_o,k.
 
-use super::fdao::{Bindings, Fdao, Rule};
+use super::fdao::{Bindings, Fdao};
 use super::labels::Labels;
+use super::mask::{Mask, Masked};
 use crate::Result;
+use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
 use crate::rays::rays::RayPlan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Format, Recorder, Stage};
+use cao_gpu::{Buffer, Format, Image, Recorder, Stage};
 use cao_model::options::Combine;
 use cao_model::settings::Setup;
 
@@ -19,16 +22,17 @@ use cao_model::settings::Setup;
 pub struct Driven {
     fdao: Fdao,
     labels: Labels,
+    mask: Mask,
+    masked: Masked,
     plan: RayPlan,
     combine: Combine,
     /// Of a voxel, in mm.
     diagonal: f32,
 }
 
-impl Driven {
-    fn rule(&self, on: &Subject) -> Rule {
-        Rule::new(self.combine, on.features.features.list.len())
-    }
+/// How many features the scene has.
+fn features(on: &Subject) -> usize {
+    on.features.features.list.len()
 }
 
 impl Gather for Driven {
@@ -39,6 +43,8 @@ impl Gather for Driven {
         Ok(Self {
             fdao: Fdao::new(&on.gpu)?,
             labels: Labels::new(&on.gpu, &on.field)?,
+            mask: Mask::new(&on.gpu, &on.field)?,
+            masked: Masked::new(&on.gpu, &on.field, features(on))?,
             plan: RayPlan::new(on.field.spacing, &on.setup.occlusion)?,
             combine: on.setup.options.combine,
             diagonal: on.field.diagonal(),
@@ -46,8 +52,12 @@ impl Gather for Driven {
     }
 
     fn set(&mut self, on: &Subject) -> Result<()> {
-        self.plan = RayPlan::new(on.field.spacing, &on.setup.occlusion)?;
-        self.combine = on.setup.options.combine;
+        let plan = RayPlan::new(on.field.spacing, &on.setup.occlusion)?;
+        // With other features everything is computed anew, and these are, too.
+        if self.masked.images.len() != features(on) {
+            self.masked = Masked::new(&on.gpu, &on.field, features(on))?;
+        }
+        (self.plan, self.combine) = (plan, on.setup.options.combine);
         Ok(())
     }
 
@@ -68,10 +78,27 @@ impl Gather for Driven {
     }
 
     fn changed<'a>(&'a self, on: &'a Subject, change: &'a Buffer) -> Option<Part<'a>> {
-        Some(Part::short(stages::LABELS, move |rec| {
-            let scene = &on.features;
-            Ok(self.labels.record(rec, &on.field, &scene.index, scene.features.is_empty(), change)?)
-        }))
+        (!self.masked.images.is_empty()).then(|| {
+            Part::short(stages::LABELS, move |rec| {
+                Ok(self.labels.record(rec, &on.field, &on.features.index, change)?)
+            })
+        })
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        opacity: &'a Image,
+        change: &'a Buffer,
+        changed: Changed,
+    ) -> Vec<Part<'a>> {
+        if self.masked.images.is_empty() {
+            return Vec::new();
+        }
+        vec![Part::short(stages::MASK, move |rec| {
+            let labels = &self.labels.image;
+            Ok(self.mask.record(rec, &on.field, changed.anew, opacity, labels, change, &self.masked)?)
+        })]
     }
 
     fn stage(&self) -> (Stage, u32) {
@@ -80,9 +107,14 @@ impl Gather for Driven {
     }
 
     fn record(&self, rec: &mut Recorder, to: &Target, take: &Take) -> Result<()> {
-        let b =
-            Bindings { opacity: to.opacity, labels: &self.labels.image, list: to.list, ambient: to.ambient };
-        let (field, scope, rule) = (&to.on.field, to.on.setup.scope, self.rule(to.on));
-        Ok(self.fdao.record(rec, field, &self.plan, rule, to.on.ambient_mm, scope, b, take)?)
+        let b = Bindings {
+            opacity: to.opacity,
+            labels: &self.labels.image,
+            masked: &self.masked,
+            list: to.list,
+            ambient: to.ambient,
+        };
+        let (field, scope) = (&to.on.field, to.on.setup.scope);
+        Ok(self.fdao.record(rec, field, &self.plan, self.combine, to.on.ambient_mm, scope, b, take)?)
     }
 }

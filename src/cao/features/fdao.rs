@@ -1,44 +1,24 @@
 //! Feature-driven ambient occlusion by rays by brick (fdAO §4, eq. (5), (6); `cao_twin::features::fdao` has the equations): of each
-//! feature the rays of its own opacity, in every voxel of the listed bricks that needs a value, and a rule that makes one of them.
+//! feature the rays of its own opacity, in the voxels of the listed bricks whose value depends on it, and a rule that makes one of them.
 //!
-//! In: `opacity` V_o (3D r16unorm), `labels` (3D r8uint), the list of bricks. Out: `ambient` V_AO (3D rgba16unorm), one write a voxel. Cost:
-//! the reads of rays by brick, one more of each far cell with opacity, those of 16³ voxels a brick; with more than four features
-//! twice that for rules that ask for all of them.
+//! In: `opacity` V_o (3D r16unorm), `labels` f (3D r8uint), `masked` V_o,k and the bricks that hold it ([`super::mask`]), the list of bricks. In and out:
+//! `ambient` V_AO (3D rgba16unorm). Cost: a pass for each feature, in which a voxel that asks for it costs what it costs rays by brick; `own` asks
+//! for one feature a voxel, `neighbours` too, also beside the brick, `sample` for those that touch it, `max` for all within reach.
 
+use super::mask::Masked;
 use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use crate::rays::rays::RayPlan;
 use crate::rays::ruled::Ruled;
 use cao_gpu::Result;
-use cao_gpu::{Gpu, Image, Recorder};
+use cao_gpu::{Access, Gpu, Image, Recorder};
 use cao_kernels::fdao as kernel;
-use cao_model::occlusion::Quadrature;
 use cao_model::options::Combine;
 use cao_model::settings::Scope;
 
-/// Most features whose values can be kept side by side.
-pub const CHANNELS: usize = kernel::GROUP as usize;
-
-/// How values of features become a voxel's, for so many features.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rule {
-    /// What is asked for, or [`Combine::Max`] where there are more features than [`CHANNELS`] for [`Combine::Sample`].
-    pub combine: Combine,
-    /// Groups of features.
-    groups: u32,
-}
-
-impl Rule {
-    /// For so many features.
-    pub fn new(asked: Combine, features: usize) -> Self {
-        let combine = match asked {
-            Combine::Sample if features > CHANNELS => Combine::Max,
-            other => other,
-        };
-        Self { combine, groups: features.max(1).div_ceil(CHANNELS) as u32 }
-    }
-}
+/// Most features whose values can be kept side by side; of more [`Combine::Sample`] is [`Combine::Max`].
+pub const CHANNELS: usize = kernel::CHANNELS_OF_TEXEL as usize;
 
 /// What the kernel reads and writes.
 #[derive(Clone, Copy)]
@@ -47,6 +27,8 @@ pub struct Bindings<'a> {
     pub opacity: &'a Image,
     /// Feature of each voxel.
     pub labels: &'a Image,
+    /// V_o of each feature; none where all matter is one.
+    pub masked: &'a Masked,
     /// Bricks to work on.
     pub list: &'a BrickList,
     /// V_AO.
@@ -76,13 +58,14 @@ impl Fdao {
         rec: &mut Recorder,
         field: &Field,
         plan: &RayPlan,
-        rule: Rule,
+        combine: Combine,
         reference_mm: f32,
         scope: Scope,
         b: Bindings,
         take: &Take,
     ) -> Result<()> {
-        let params = kernel::FdaoParams {
+        let images = &b.masked.images;
+        let mut params = kernel::FdaoParams {
             dims: field.dims,
             directions: plan.followed(),
             bricks: field.bricks(),
@@ -92,41 +75,38 @@ impl Fdao {
             unneeded: u32::from(scope == Scope::All),
             exponent: plan.step_mm / reference_mm,
             shift: plan.shift,
-            combine: match rule.combine {
+            combine: match combine {
+                _ if images.is_empty() => kernel::ALL,
                 Combine::Own => kernel::OWN,
                 Combine::Neighbours => kernel::NEIGHBOURS,
-                Combine::Max => kernel::MOST,
-                Combine::Sample => kernel::CHANNELS,
+                Combine::Sample if images.len() <= CHANNELS => kernel::CHANNELS,
+                Combine::Sample | Combine::Max => kernel::MOST,
             },
-            groups: rule.groups,
-            close: u32::from(farthest_filtered(plan) < CLOSE),
+            feature: 0,
+            features: images.len() as u32,
             pad: Default::default(),
         };
-        let binds = kernel::HybridBindings {
-            opacity: b.opacity,
-            field: &self.ruled.field,
-            directions: &self.ruled.directions,
-            cells: &self.ruled.cells,
-            list: &b.list.buffer,
-            labels: b.labels,
-            ambient: b.ambient,
-        };
-        let push = bytemuck::bytes_of(&params);
-        take.dispatch(rec, self.ruled.pipeline(plan), &binds, push, &b.list.buffer)
+        let all = std::slice::from_ref(b.opacity);
+        for image in if images.is_empty() { all } else { images } {
+            if params.feature > 0 {
+                let both = [Access::StorageRead, Access::StorageWrite];
+                rec.barrier(&both, &both);
+            }
+            params.feature += 1;
+            let binds = kernel::HybridBindings {
+                opacity: image,
+                field: &self.ruled.field,
+                directions: &self.ruled.directions,
+                cells: &self.ruled.cells,
+                list: &b.list.buffer,
+                labels: b.labels,
+                ambient: b.ambient,
+                matter: b.opacity,
+                held: &b.masked.held,
+            };
+            let push = bytemuck::bytes_of(&params);
+            take.dispatch(rec, self.ruled.pipeline(plan), &binds, push, &b.list.buffer)?;
+        }
+        Ok(())
     }
-}
-
-/// Voxels along an axis that a place may be away from its voxel so that what it interpolates is within the kernel's margin; a hundredth is
-/// for rounding.
-const CLOSE: f32 = kernel::MARGIN as f32 - 0.01;
-
-/// How far along an axis, in voxels, the farthest place is that is interpolated.
-fn farthest_filtered(plan: &RayPlan) -> f32 {
-    let half_steps = match plan.rule {
-        Quadrature::Nearest => return 0.0,
-        Quadrature::Linear => 2.0 * plan.cells.max(2) as f32,
-        _ => 2.0 * kernel::NEAR as f32,
-    };
-    let axis = |d: &kernel::Direction| d.half_step.into_iter().fold(0.0, |most: f32, c| most.max(c.abs()));
-    plan.directions.iter().map(axis).fold(0.0, f32::max) * (half_steps + 2.0 * plan.shift)
 }

@@ -29,18 +29,11 @@ impl Labels {
         Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")?, image })
     }
 
-    /// Takes the features of a scene, or, for `one`, that all voxels are of one.
-    pub fn record(
-        &self,
-        rec: &mut Recorder,
-        field: &Field,
-        features: &Image,
-        one: bool,
-        change: &Buffer,
-    ) -> Result<()> {
+    /// Takes the features of a scene.
+    pub fn record(&self, rec: &mut Recorder, field: &Field, features: &Image, change: &Buffer) -> Result<()> {
         let all = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
         rec.barrier(&all, &[Access::StorageRead, Access::StorageWrite]);
-        let params = kernel::LabelsParams { dims: field.dims, one: u32::from(one) };
+        let params = kernel::LabelsParams { dims: field.dims, pad: Default::default() };
         let binds = kernel::MainBindings { features, labels: &self.image, change };
         let groups = row_of_groups(field.brick_count());
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)?;

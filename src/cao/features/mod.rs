@@ -3,3 +3,4 @@
 pub mod driven;
 pub mod fdao;
 pub mod labels;
+pub mod mask;

@@ -13,7 +13,7 @@ use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Image, Recorder, Stage};
+use cao_gpu::{Buffer, Image, Recorder, Stage};
 use cao_model::settings::Setup;
 use std::sync::{Mutex, PoisonError};
 
@@ -81,7 +81,13 @@ impl Gather for Clustered {
         1.01 * self.diagonal
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, _: &'a Image, changed: Changed) -> Vec<Part<'a>> {
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        _: &'a Image,
+        _: &'a Buffer,
+        changed: Changed,
+    ) -> Vec<Part<'a>> {
         let (histogram, clusters, field) = (&self.histogram, &self.clusters, &on.field);
         let sampled = &histogram.sampled;
         let mut parts = vec![Part::long(stages::HISTOGRAMS, move |rec| {

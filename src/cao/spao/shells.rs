@@ -9,7 +9,7 @@ use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Image, Recorder, Stage};
+use cao_gpu::{Buffer, Image, Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// The volumes of means, and their product.
@@ -70,7 +70,13 @@ impl Gather for Shells {
         Some(Part::short(stages::TABLE, |rec| Ok(self.make.record_table(rec, &self.levels.plan)?)))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, _: Changed) -> Vec<Part<'a>> {
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        opacity: &'a Image,
+        _: &'a Buffer,
+        _: Changed,
+    ) -> Vec<Part<'a>> {
         self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
     }
 

@@ -11,7 +11,7 @@ use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Image, Recorder, Stage};
+use cao_gpu::{Buffer, Image, Recorder, Stage};
 use cao_model::settings::{AntiAliasing, MapSettings, Setup};
 use std::sync::{Mutex, PoisonError};
 
@@ -59,7 +59,13 @@ impl<const SHELLS: bool> Gather for Summed<SHELLS> {
         Some(Part::short(stages::SHELLS, |rec| Ok(self.boxes.record_shells(rec, &self.plan)?)))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, changed: Changed) -> Vec<Part<'a>> {
+    fn prepare<'a>(
+        &'a self,
+        on: &'a Subject,
+        opacity: &'a Image,
+        _: &'a Buffer,
+        changed: Changed,
+    ) -> Vec<Part<'a>> {
         let counted = self.plan.counted;
         let wanted = Some((counted, on.setup.anti_aliasing, on.setup.maps));
         vec![Part::long(stages::SUMS, move |rec| {
