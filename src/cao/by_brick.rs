@@ -14,7 +14,7 @@ use crate::clip::classify::{AFFECTED, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
 use crate::drive::{self, Pace, Part, Take};
 use crate::field::bricks::BrickList;
-use crate::field::near::{self, FAR, Near, TODO};
+use crate::field::near::{self, FAR, Near, Reach, TODO};
 use crate::field::ones::Ones;
 use crate::field::{BRICK, Field, volume_image};
 use crate::host::read_buffer;
@@ -51,8 +51,8 @@ pub trait Gather: Send + Sync + Sized {
     /// As [`Self::set`].
     fn accepts(&self, on: &Subject, setup: &Setup) -> Result<()>;
 
-    /// How far in mm a change of opacity can change values.
-    fn reach_mm(&self) -> f32;
+    /// How far a change of opacity can change values.
+    fn reach(&self) -> Reach;
 
     /// What comes before opacities where settings are new.
     fn settings<'a>(&'a self, on: &'a Subject) -> Option<Part<'a>> {
@@ -254,7 +254,7 @@ impl<G: Gather> ByBrick<G> {
                 todo,
                 list: to.list,
             };
-            Ok(k.near.record(rec, &to.on.field, to.on.setup.scope, self.gather.reach_mm(), bindings)?)
+            Ok(k.near.record(rec, &to.on.field, to.on.setup.scope, self.gather.reach(), bindings)?)
         })
     }
 

@@ -23,6 +23,7 @@ mod lengths;
 mod limits;
 mod methods;
 mod planner;
+mod reach;
 mod real_data;
 mod samples;
 mod scenes;

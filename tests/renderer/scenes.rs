@@ -98,6 +98,11 @@ impl Scene {
                     let rule = ["own", "neighbours", "max", "sample"][pick(random, 4)];
                     next.options.set("combine", rule).unwrap();
                 }
+                if next.method.entry().options.contains(&"levels") && random.below(2) == 0 {
+                    let form = ["nbuffer", "mip", "mixed:1", "reversed:2"][pick(random, 4)];
+                    next.options.set("levels", form).unwrap();
+                    next.options.set("normal", ["0", "1.3"][pick(random, 2)]).unwrap();
+                }
                 match random.below(5) {
                     0 => {
                         let radius = [0.0, random.between(0.0, 18.0), random.between(18.0, 60.0)];

@@ -5,6 +5,7 @@ use crate::Result;
 use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
@@ -50,8 +51,8 @@ impl Gather for Cones {
         plans(on, setup).map(drop)
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.plan.reach_mm
+    fn reach(&self) -> Reach {
+        Reach::Box(self.plan.reach)
     }
 
     /// The cones, and how levels are looked up.

@@ -8,6 +8,7 @@ use super::labels::Labels;
 use crate::Result;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::rays::rays::RayPlan;
 use crate::stages;
 use crate::subject::Subject;
@@ -56,10 +57,10 @@ impl Gather for Driven {
         Ok(())
     }
 
-    fn reach_mm(&self) -> f32 {
+    fn reach(&self) -> Reach {
         // Values of neighbours are a diagonal away; a hundredth is for rounding.
         let beside = if self.combine == Combine::Neighbours { 1.01 * self.diagonal } else { 0.0 };
-        self.plan.reach_mm + beside
+        Reach::Ball(self.plan.reach_mm + beside)
     }
 
     /// The table of rays.

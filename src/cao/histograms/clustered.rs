@@ -11,6 +11,7 @@ use crate::Result;
 use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Image, Recorder, Stage};
@@ -23,8 +24,6 @@ pub struct Clustered {
     clusters: Clusters,
     expand: Expand,
     plan: HistogramPlan,
-    /// Of a voxel, mm.
-    diagonal: f32,
     /// What the clusters are of once all that was recorded has run: which values, and which histograms of them; `None` before the first.
     held: Mutex<Option<(u64, HistogramPlan)>>,
 }
@@ -62,7 +61,6 @@ impl Gather for Clustered {
             clusters: Clusters::new(&on.gpu)?,
             expand: Expand::new(&on.gpu)?,
             plan: plan(on, &on.setup),
-            diagonal: on.field.diagonal(),
             held: Mutex::new(None),
         })
     }
@@ -77,8 +75,8 @@ impl Gather for Clustered {
     }
 
     /// Opacities say only which voxels need a value: those beside them.
-    fn reach_mm(&self) -> f32 {
-        1.01 * self.diagonal
+    fn reach(&self) -> Reach {
+        Reach::Box([1; 3])
     }
 
     fn prepare<'a>(&'a self, on: &'a Subject, _: &'a Image, changed: Changed) -> Vec<Part<'a>> {

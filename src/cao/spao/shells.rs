@@ -5,6 +5,7 @@ use crate::Result;
 use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
@@ -18,19 +19,13 @@ pub struct Shells {
     product: Product,
     levels: LevelImages,
     lifted: bool,
-    reach_mm: f32,
+    reach: Reach,
 }
 
 fn plan(on: &Subject, setup: &Setup) -> Result<Plan> {
     let (field, options) = (&on.field, &setup.options);
     let radius_mm = setup.occlusion.radius_mm;
     Ok(Plan::new(field.dims, field.spacing, radius_mm, options.levels, options.normal)?)
-}
-
-/// From the corner of the box that a value depends on, in mm.
-fn reach_mm(on: &Subject, plan: &Plan) -> f32 {
-    let reach = plan.reach();
-    glam::Vec3::from_array(std::array::from_fn(|i| reach[i] * on.field.spacing[i])).length()
 }
 
 impl Gather for Shells {
@@ -41,7 +36,7 @@ impl Gather for Shells {
         Ok(Self {
             make: MakeLevels::new(&on.gpu)?,
             product: Product::new(&on.gpu)?,
-            reach_mm: reach_mm(on, &plan),
+            reach: Reach::Box(plan.reach([0.0; 3])),
             levels: LevelImages::new(&on.gpu, plan)?,
             lifted: on.setup.options.normal > 0.0,
         })
@@ -49,11 +44,11 @@ impl Gather for Shells {
 
     fn set(&mut self, on: &Subject) -> Result<()> {
         let plan = plan(on, &on.setup)?;
-        let reach_mm = reach_mm(on, &plan);
+        self.reach = Reach::Box(plan.reach([0.0; 3]));
         if plan != self.levels.plan {
             self.levels = LevelImages::new(&on.gpu, plan)?;
         }
-        (self.lifted, self.reach_mm) = (on.setup.options.normal > 0.0, reach_mm);
+        self.lifted = on.setup.options.normal > 0.0;
         Ok(())
     }
 
@@ -61,8 +56,8 @@ impl Gather for Shells {
         plan(on, setup).map(drop)
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.reach_mm
+    fn reach(&self) -> Reach {
+        self.reach
     }
 
     /// How levels are looked up.

@@ -9,6 +9,7 @@ use crate::Result;
 use crate::ambient::Changed;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Image, Recorder, Stage};
@@ -50,8 +51,8 @@ impl<const SHELLS: bool> Gather for Summed<SHELLS> {
         Ok(())
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.plan.reach_mm
+    fn reach(&self) -> Reach {
+        Reach::Box(self.plan.reach)
     }
 
     /// The table of boxes.
