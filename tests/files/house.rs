@@ -317,7 +317,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/by_brick.rs", &["error", "host", "stages", "drive", "field", "clip", "subject", "ambient"]),
     ("src/cao/rays/", &["error", "host", "stages", "drive", "field", "subject", "by_brick"]),
     ("src/cao/features/", &["error", "host", "stages", "drive", "field", "subject", "by_brick", "rays"]),
-    ("src/cao/pyramid/", &["error", "stages", "drive", "field"]),
+    ("src/cao/pyramid/", &["error", "host", "stages", "drive", "field"]),
     ("src/cao/spao/", &["error", "stages", "drive", "field", "subject", "ambient", "by_brick", "pyramid"]),
     ("src/cao/cones/", &["error", "stages", "drive", "field", "subject", "ambient", "by_brick", "pyramid"]),
     ("src/cao/tables/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),

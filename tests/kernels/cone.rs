@@ -52,7 +52,7 @@ fn computed(
     run(gpu, |rec| {
         make.record_table(rec, &levels.plan).unwrap();
         kernel.record_cones(rec, &plan).unwrap();
-        for part in make.parts(exponent, &levels, &image) {
+        for part in make.parts(exponent, &levels, &image, None) {
             part.record(rec, &Take::All).unwrap();
         }
         let b = Bindings { opacity: &image, make: &make, levels: &levels, list: &list, ambient: &ambient };

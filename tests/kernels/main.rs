@@ -35,4 +35,5 @@ mod reference;
 mod shading;
 mod ssao;
 mod sums;
+mod tiles;
 mod vicinity;

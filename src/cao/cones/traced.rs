@@ -3,14 +3,14 @@
 use super::cone::{Bindings, ConePlan, ConeTracing};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
 use crate::field::near::Reach;
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// Mip levels, and cones through them.
@@ -63,8 +63,10 @@ impl Gather for Cones {
         }))
     }
 
-    fn prepare<'a>(&'a self, on: &'a Subject, opacity: &'a Image, _: Changed) -> Vec<Part<'a>> {
-        self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
+        let (exponent, change) =
+            (on.field.min_spacing() / on.ambient_mm, (!changed.anew).then_some(from.change));
+        self.make.parts(exponent, &self.levels, from.opacity, change)
     }
 
     fn stage(&self) -> (Stage, u32) {

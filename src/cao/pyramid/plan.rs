@@ -40,6 +40,18 @@ pub struct Cells {
     pub dims: [u32; 3],
 }
 
+impl Cells {
+    /// Tiles along each axis: as many cells as a brick has voxels.
+    pub fn tiles(&self) -> [u32; 3] {
+        self.dims.map(|n| n.div_ceil(BRICK))
+    }
+
+    /// Tiles in all.
+    pub fn tile_count(&self) -> u32 {
+        self.tiles().iter().product()
+    }
+}
+
 /// All levels, the first that of V_o itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
