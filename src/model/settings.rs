@@ -1,6 +1,6 @@
 //! How occlusion is computed: everything that a renderer can be told about it, as plain data.
 
-use crate::methods::Method;
+use crate::methods::{METHODS, Method};
 use crate::occlusion::{Occlusion, RaySet};
 use crate::options::Options;
 use crate::{Error, Result};
@@ -36,7 +36,7 @@ impl Setup {
         }
     }
 
-    /// Refuses lengths and rays that there are none of, and a rule, rays or an option that the method does not have.
+    /// Refuses lengths, rays and lights that there are none of, and a rule, rays, a light or an option that the method does not have.
     ///
     /// # Errors
     /// As [`Occlusion::check`], and [`Error::Config`] naming what the method has not, and what it has.
@@ -62,6 +62,15 @@ impl Setup {
                 _ => format!("{:?}, but method {} follows no rays", rays.name(), entry.name),
             };
             return Err(Error::refused("rays", problem));
+        }
+        let needs = self.occlusion.light.needs();
+        if entry.lights < needs {
+            let having = METHODS.iter().filter(|entry| entry.lights >= needs).map(|entry| entry.name);
+            let (what, having) = (needs.name(), having.collect::<Vec<_>>().join(", "));
+            let has = entry.lights.name();
+            let problem =
+                format!("{what}, but method {} has {has} only; methods with it: {having}", entry.name);
+            return Err(Error::refused("light", problem));
         }
         for (name, _) in self.options.other_than(&Options::DEFAULT) {
             if !entry.options.contains(&name) {

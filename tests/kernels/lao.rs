@@ -146,7 +146,10 @@ fn occlusion(rays: RaySet, quadrature: Quadrature, turn: usize, smallest: f64) -
     let (radius, step, offset, reference) = LENGTHS[turn % LENGTHS.len()];
     let mm = |length: f32| length * smallest as f32;
     let (radius_mm, step_mm, offset_mm) = (mm(radius), step.map(mm), offset.map(mm));
-    (Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm }, reference * smallest)
+    (
+        Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm, ..Occlusion::paper(1.0) },
+        reference * smallest,
+    )
 }
 
 /// Opacities up to this are far enough from 1 that no function along a ray has an unbounded slope there.
@@ -215,6 +218,7 @@ fn opaque_blocks() {
                 radius_mm: 7.0 * grid.min_spacing() as f32,
                 offset_mm: None,
                 step_mm: None,
+                ..Occlusion::paper(1.0)
             };
             let reference_mm = grid.min_spacing();
             let settings = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };

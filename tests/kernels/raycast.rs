@@ -68,6 +68,7 @@ pub fn setup(maps: MapSettings) -> Setup {
             radius_mm: 4.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         },
         method: Method::Cao,
         options: Options::DEFAULT,

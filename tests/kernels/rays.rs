@@ -121,7 +121,14 @@ fn settings(
 ) -> Occlusion {
     let mm = |voxels: f64| (voxels * grid.min_spacing()) as f32;
     let radius_mm = mm(radius.unwrap_or(0.0));
-    Occlusion { rays, quadrature, radius_mm, offset_mm: offset.map(mm), step_mm: step.map(mm) }
+    Occlusion {
+        rays,
+        quadrature,
+        radius_mm,
+        offset_mm: offset.map(mm),
+        step_mm: step.map(mm),
+        ..Occlusion::paper(1.0)
+    }
 }
 
 /// `nearest` bit for bit; the filter's rules closely. The same bits whatever the order of bricks, slices and directions.

@@ -174,6 +174,7 @@ fn the_papers_sum_converges_to_the_literal_reference() {
             radius_mm: RADIUS as f32,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         let found: Vec<f32> =
             twin::cast::lao::lao(&grid, &opacity, &settings, 1.0).into_iter().map(|a| a as f32).collect();

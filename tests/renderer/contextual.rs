@@ -29,6 +29,7 @@ const SETUP: Setup = Setup {
         radius_mm: 3.0,
         offset_mm: None,
         step_mm: None,
+        ..Occlusion::paper(1.0)
     },
     method: Method::Cao,
     options: Options::DEFAULT,

@@ -29,7 +29,7 @@ const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, li
 
 fn setup(rays: RaySet, quadrature: Quadrature, radius_mm: f32, scope: Scope) -> Setup {
     Setup {
-        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
+        occlusion: Occlusion { rays, quadrature, radius_mm, ..Occlusion::paper(1.0) },
         method: Method::Cao,
         options: Options::DEFAULT,
         scope,

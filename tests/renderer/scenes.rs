@@ -23,7 +23,7 @@ const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, li
 fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
     let (rays, quadrature) = (method.rays_like(rays), method.quadrature());
     Setup {
-        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
+        occlusion: Occlusion { rays, quadrature, radius_mm, ..Occlusion::paper(1.0) },
         method,
         options: Options::DEFAULT,
         scope: Scope::Needed,
