@@ -12,7 +12,7 @@
 //! negative light.
 
 use crate::error::quoted;
-use crate::occlusion::{Occlusion, RaySet};
+use crate::occlusion::{Integral, Occlusion, RaySet, fibonacci};
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 
@@ -205,6 +205,32 @@ impl Occlusion {
     }
 }
 
+impl Integral {
+    /// The directions from which light comes, and what comes from each in shares of the mean of all of these.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for coloured light, and for light that comes from nowhere.
+    pub fn lit_directions(&self) -> Result<Vec<([f64; 3], f64)>> {
+        let all = fibonacci(self.directions);
+        if self.light == AmbientLight::Uniform {
+            return Ok(all.into_iter().map(|d| (d, 1.0)).collect());
+        }
+        if self.light.needs() == Lights::Coloured {
+            let problem =
+                "coloured; a reference, and with it a budget, is of one colour: expected a channel of it";
+            return Err(Error::refused("light", problem));
+        }
+        let lit = all.into_iter().map(|d| (d, self.light.from(d)[0])).filter(|(_, light)| *light > 0.0);
+        let mut lit: Vec<_> = lit.collect();
+        if lit.is_empty() {
+            return Err(Error::refused("light", "none comes from anywhere; expected some"));
+        }
+        let mean = lit.iter().map(|(_, light)| light).sum::<f64>() / lit.len() as f64;
+        lit.iter_mut().for_each(|(_, light)| *light /= mean);
+        Ok(lit)
+    }
+}
+
 /// Lengths of the harmonics: √(1/4π), √(3/4π), √(15/4π), √(5/16π), √(15/16π).
 const Y0: f64 = 0.282_094_791_773_878_14;
 const Y1: f64 = 0.488_602_511_902_919_9;
@@ -260,7 +286,6 @@ fn turned(c: [f64; HARMONICS], turn: DMat3) -> [f64; HARMONICS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::occlusion::fibonacci;
     use glam::DQuat;
 
     /// Of each channel another light, none of it even anywhere.

@@ -330,6 +330,8 @@ pub struct Integral {
     pub step_mm: f64,
     /// Samples of a ray; 0 leaves every point unoccluded.
     pub samples: u32,
+    /// Where light comes from; of one colour.
+    pub light: AmbientLight,
 }
 
 /// What the samples of a reference's ray become.
@@ -356,13 +358,15 @@ impl Integral {
         let samples = (length / min_spacing * f64::from(steps_per_voxel) - 1e-6).ceil().max(0.0);
         let step_mm = if samples > 0.0 { length / samples } else { min_spacing };
         let first_mm = offset_mm + 0.5 * step_mm;
-        Self { rule: Rule::Ambient, directions, first_mm, step_mm, samples: samples as u32 }
+        let light = AmbientLight::Uniform;
+        Self { rule: Rule::Ambient, directions, first_mm, step_mm, samples: samples as u32, light }
     }
 
     /// What CAO eq. (2) and (3) converge to with ever more rays: its sum at steps of the smallest spacing.
     pub fn literal(radius_mm: f64, directions: u32, min_spacing: f64) -> Self {
         let samples = (radius_mm / min_spacing).round() as u32;
-        Self { rule: Rule::Literal, directions, first_mm: min_spacing, step_mm: min_spacing, samples }
+        let (first_mm, step_mm, light) = (min_spacing, min_spacing, AmbientLight::Uniform);
+        Self { rule: Rule::Literal, directions, first_mm, step_mm, samples, light }
     }
 
     /// The same at twice the resolution: twice the directions, and for [`Rule::Ambient`] half the step.

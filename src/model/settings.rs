@@ -215,3 +215,34 @@ impl MapSettings {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::{AmbientLight, Lights};
+
+    /// By name, and with the methods that have it.
+    #[test]
+    fn a_method_without_a_light_says_which_have_it() {
+        let coloured = AmbientLight::harmonics(&[[3.0; 3], [0.5, 0.0, -0.5]]).unwrap();
+        for entry in METHODS {
+            for (light, needs, having) in [
+                (AmbientLight::Uniform, Lights::Uniform, ""),
+                (AmbientLight::SKY, Lights::Grey, "methods with it: lao, cao, rays"),
+                (coloured, Lights::Coloured, "methods with it: rays"),
+            ] {
+                let mut setup = Setup::of(entry.method, 1.0);
+                setup.occlusion.light = light;
+                match setup.check(1.0) {
+                    Ok(()) => assert!(entry.lights >= needs, "{} {needs:?}", entry.name),
+                    Err(error) => {
+                        let said = error.to_string();
+                        assert!(entry.lights < needs, "{} {needs:?}", entry.name);
+                        let told = said.starts_with("light: ") && said.ends_with(having);
+                        assert!(told && said.contains(entry.name) && said.contains(needs.name()), "{said}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -135,7 +135,7 @@ impl Raycast {
             first_tile: tiles.start,
             tiles: tiles.len() as u32,
             ended: u32::from(ended),
-            channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm),
+            channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm && !b.coloured),
             pad: Default::default(),
         };
         let [x, y, _] = row_of_groups(tiles.len() as u32);
