@@ -33,6 +33,12 @@ pub trait Gather: Send + Sync + Sized {
     /// Whether values are of V and the transfer function, and not of V_o alone: then an edit of these concerns every one.
     const OF_VALUES: bool = false;
 
+    /// Format of V_AO by these settings, where there are several. Where it is another it is made anew.
+    fn format(on: &Subject) -> Format {
+        let _ = on;
+        Self::FORMAT
+    }
+
     /// For the subject's settings. Uses the device's queue and waits for it.
     ///
     /// # Errors
@@ -200,7 +206,7 @@ impl<G: Gather> ByBrick<G> {
         let gather = G::new(on)?;
         Ok(Self {
             kernels: Kernels::new(&on.gpu)?,
-            volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::FORMAT)?,
+            volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::format(on))?,
             gather,
         })
     }

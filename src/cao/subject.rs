@@ -14,6 +14,7 @@ use crate::stages;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
+use cao_model::light::Lights;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -73,6 +74,11 @@ impl Subject {
             dilate: Dilate::new(gpu)?,
             field,
         })
+    }
+
+    /// Whether ambient light is coloured: then V_AO has red, green and blue.
+    pub fn coloured(&self) -> bool {
+        self.setup.occlusion.light.needs() == Lights::Coloured
     }
 
     /// Reference length of the opacity in mm.

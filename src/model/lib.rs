@@ -9,6 +9,7 @@ pub mod error;
 pub mod feature;
 pub mod fit;
 pub mod frame;
+pub mod light;
 pub mod look;
 pub mod memory;
 pub mod mesh;

@@ -145,6 +145,7 @@ fn every_rule_equals_its_twin_in_any_order() {
                     radius_mm: mm(radius.unwrap_or(0.0)),
                     offset_mm: offset.map(mm),
                     step_mm: step.map(mm),
+                    ..Occlusion::paper(1.0)
                 };
                 let reference_mm = reference * occlusion.step(grid.min_spacing());
                 let asked = Asked { opacity: &images[0], labels: &images[1], reference_mm, scope };
@@ -205,6 +206,7 @@ fn one_feature_has_the_values_of_rays_by_brick() {
             radius_mm: 9.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         let plan = RayPlan::new(state.field.spacing, &occlusion).unwrap();
         let asked = |labels| Asked { opacity: &opacity, labels, reference_mm: 1.1, scope: Scope::Needed };

@@ -20,6 +20,7 @@ mod host;
 mod host_image;
 mod leaks;
 mod lengths;
+mod light;
 mod limits;
 mod methods;
 mod planner;

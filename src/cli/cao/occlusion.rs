@@ -21,7 +21,8 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let frame = args.frame.unwrap_or_default();
     let (mut volume, turn) = frame.arrange(args.raw.open(&args.input)?)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
-    let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    let mut setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
     let transfer = cao_formats::transfer::load(transfer, volume.range());
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let features = args.parts.of(FeatureSettings::default(), &volume, frame)?;

@@ -1,0 +1,128 @@
+//! Ambient light in a renderer: what turns with it and what stays, and which values its colours have.
+
+use cao::renderer::{COLOUR, Renderer};
+use cao_gpu::{Gpu, Phase};
+use cao_measure::random::Random;
+use cao_model::builtin::builtin_box;
+use cao_model::clip::Shape;
+use cao_model::light::AmbientLight;
+use cao_model::methods::Method;
+use cao_model::occlusion::Occlusion;
+use cao_model::settings::Setup;
+use cao_model::transfer::TransferFunction;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
+use cao_testing::*;
+use cao_twin::Grid;
+
+fn setup(method: Method, light: AmbientLight) -> Setup {
+    let of_method = Setup::of(method, 1.0);
+    Setup { occlusion: Occlusion { radius_mm: 6.0, light, ..of_method.occlusion }, ..of_method }
+}
+
+fn updated(renderer: &mut Renderer) -> Vec<[u32; 3]> {
+    renderer.update(&mut |_| ()).unwrap();
+    assert_eq!(cao::verify::verify(renderer, &mut |_| ()).unwrap().0.different, 0);
+    let colours = renderer.read_ambient_colours().unwrap();
+    let least = |c: &[f32; 3]| c.iter().copied().fold(1.0, f32::min);
+    assert!(colours.iter().map(least).eq(renderer.read_ambient().unwrap()), "read_ambient has the least");
+    colours.into_iter().map(|c| c.map(f32::to_bits)).collect()
+}
+
+/// From uniform to a sky, to colours, turned, and back, with clips that move between: the values are those of a renderer made for it, opacities
+/// stay, and a light that turns computes ambient values alone.
+#[test]
+fn a_light_is_an_edit_of_ambient_values_alone() {
+    let gpu = open();
+    let volume = builtin_box("fruit", [26, 22, 24], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let make =
+        |light| Renderer::new(&gpu, &volume, transfer.clone(), setup(Method::Rays, light), COLOUR).unwrap();
+    let mut random = Random::new(15);
+    let mut renderer = make(AmbientLight::Uniform);
+    let uniform = updated(&mut renderer);
+    let coloured = coloured_light();
+    let mut seen = vec![uniform.clone()];
+    for light in [AmbientLight::SKY, coloured, coloured.turned(third_turn()), AmbientLight::Uniform] {
+        let opacity = renderer.read_opacity().unwrap();
+        renderer.set_ambient_light(light).unwrap();
+        let found = updated(&mut renderer);
+        assert_eq!(renderer.read_opacity().unwrap(), opacity, "{light:?}");
+        let mut fresh = make(light);
+        assert!(found == updated(&mut fresh), "{light:?}");
+        let again = seen.iter().filter(|other| **other == found).count();
+        assert_eq!(again, usize::from(light == AmbientLight::Uniform), "{light:?}");
+        seen.push(found);
+        let clips = [random_clip(&mut random, &Shape::Sphere, size_mm(&grid_of(&volume)))];
+        for renderer in [&mut renderer, &mut fresh] {
+            renderer.set_clips(&clips).unwrap();
+        }
+        assert!(updated(&mut renderer) == updated(&mut fresh), "{light:?}: with a clip");
+        renderer.set_clips(&[]).unwrap();
+        renderer.update(&mut |_| ()).unwrap();
+    }
+    // Which opacities there are is not asked again.
+    renderer.set_ambient_light(AmbientLight::SKY).unwrap();
+    let timings = renderer.update(&mut |_| ()).unwrap();
+    let opacities = timings.iter().filter(|timing| timing.stage.phase == Phase::Opacity);
+    assert_eq!(opacities.count(), 0, "{timings:?}");
+    drop(renderer);
+    close(gpu);
+}
+
+/// Red, green and blue are those of three lights of one colour each, to the bit, whatever the rule.
+#[test]
+fn colours_are_the_values_of_their_grey_lights() {
+    let gpu = open();
+    let volume = builtin_box("skeleton", [22, 20, 25], [1.0, 1.2, 0.9]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let light = coloured_light();
+    let mut renderer = Renderer::new(&gpu, &volume, transfer, setup(Method::Rays, light), COLOUR).unwrap();
+    for &quadrature in Method::Rays.entry().quadratures {
+        let mut asked = *renderer.setup();
+        (asked.occlusion.quadrature, asked.occlusion.light) = (quadrature, light);
+        renderer.set_setup(asked).unwrap();
+        let colours = updated(&mut renderer);
+        for c in 0..3 {
+            renderer.set_ambient_light(light.channel(c)).unwrap();
+            let grey = updated(&mut renderer);
+            assert!(grey.iter().zip(&colours).all(|(g, own)| g[0] == own[c]), "{quadrature:?} {c}");
+        }
+        assert!(colours.iter().any(|[r, g, b]| r != g && g != b), "{quadrature:?}: no colours");
+    }
+    drop(renderer);
+    close(gpu);
+}
+
+/// A plate under a sky: what lies on it has all of the light, what lies below it none, of every method that has such light.
+#[test]
+fn a_plate_takes_all_of_the_sky_from_below_and_none_from_above() {
+    let gpu = open();
+    let grid = Grid { dims: [20, 20, 20], spacing: [1.0; 3] };
+    let plate = (0..grid.len()).map(|i| if (8..12).contains(&grid.voxel(i)[2]) { 200 } else { 0 }).collect();
+    let volume = Volume::new(grid.dims, grid.spacing, Values::U8(plate)).unwrap();
+    let transfer =
+        TransferFunction::new(vec![[100.0, 0.0], [100.0, 1.0]], vec![[0.0, 1.0, 1.0, 1.0]], None).unwrap();
+    for method in [Method::Lao, Method::Cao, Method::Rays] {
+        for up in [1.0, -1.0] {
+            let light = AmbientLight::Sky([0.0, 0.0, up]);
+            let mut renderer = made(&gpu, &volume, &transfer, setup(method, light));
+            updated(&mut renderer);
+            let ambient = renderer.read_ambient().unwrap();
+            let [below, under, on] = [7, 8, 12].map(|z| ambient[grid.index([10, 10, z])]);
+            let name = method.name();
+            if up > 0.0 {
+                // Weights of f32 that sum to one.
+                assert!(on > 1.0 - 1e-6, "{name}: {on}");
+                assert!(under < 0.2 && below < 0.3, "{name}: {under} {below}");
+            } else {
+                assert!(on < 0.3 && below > 1.0 - 1e-6, "{name}: {on} {below}");
+            }
+        }
+    }
+    close(gpu);
+}
+
+fn made(gpu: &Gpu, volume: &Volume, transfer: &TransferFunction, setup: Setup) -> Renderer {
+    Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR).unwrap()
+}
