@@ -28,7 +28,7 @@ use crate::{Error, Result};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
-use cao_model::light::{AmbientLight, Lights};
+use cao_model::light::AmbientLight;
 use cao_model::occlusion::Occlusion;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
@@ -53,8 +53,7 @@ pub use read_back::StereoImage;
 
 /// Whether volumes and pipelines for the one serve the other.
 fn kept(one: &Setup, other: &Setup) -> bool {
-    let coloured = |setup: &Setup| setup.occlusion.light.needs() == Lights::Coloured;
-    one.method == other.method && coloured(one) == coloured(other)
+    one.method == other.method && one.coloured() == other.coloured()
 }
 
 /// Renders one volume.

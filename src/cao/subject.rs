@@ -14,7 +14,6 @@ use crate::stages;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
-use cao_model::light::Lights;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -76,9 +75,9 @@ impl Subject {
         })
     }
 
-    /// Whether ambient light is coloured: then V_AO has red, green and blue.
+    /// Whether V_AO has red, green and blue.
     pub fn coloured(&self) -> bool {
-        self.setup.occlusion.light.needs() == Lights::Coloured
+        self.setup.coloured()
     }
 
     /// Reference length of the opacity in mm.

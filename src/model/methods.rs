@@ -119,7 +119,7 @@ pub static METHODS: &[Entry] = &[
         rays: RaySet::None,
         quadratures: &[Quadrature::Histogram],
         sets: &[RaySet::None],
-        options: &["clusters"],
+        options: &["clusters", "bleeding"],
         variants: &[&[]],
         lights: Lights::Uniform,
         contextual: true,

@@ -1,5 +1,6 @@
 //! How occlusion is computed: everything that a renderer can be told about it, as plain data.
 
+use crate::light::Lights;
 use crate::methods::{METHODS, Method};
 use crate::occlusion::{Occlusion, RaySet};
 use crate::options::Options;
@@ -83,6 +84,11 @@ impl Setup {
             }
         }
         Ok(())
+    }
+
+    /// Whether V_AO has red, green and blue: in coloured light, and where matter lends its colour.
+    pub fn coloured(&self) -> bool {
+        self.occlusion.light.needs() == Lights::Coloured || self.options.bleeding > 0.0
     }
 
     /// The default method: what to use where the paper's numbers are not the point.

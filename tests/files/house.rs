@@ -264,7 +264,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
     ("src/formats/light.rs", &["error", "toml_value"]),
     ("src/formats/feature.rs", &["error", "file", "toml_value"]),
-    ("src/formats/scene.rs", &["error", "feature", "file", "light", "obj", "reading", "toml_value", "transfer"]),
+    (
+        "src/formats/scene.rs",
+        &["error", "feature", "file", "light", "obj", "reading", "toml_value", "transfer"],
+    ),
     // The readers of volumes, and what refuses and assembles for all of them.
     ("src/formats/binary.rs", &[]),
     ("src/formats/gzip.rs", &[]),

@@ -6,11 +6,14 @@ use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::Shape;
 use cao_model::light::AmbientLight;
+use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::Occlusion;
+use cao_model::options::Options;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
+use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
 use cao_testing::*;
 use cao_twin::Grid;
@@ -125,4 +128,56 @@ fn a_plate_takes_all_of_the_sky_from_below_and_none_from_above() {
 
 fn made(gpu: &Gpu, volume: &Volume, transfer: &TransferFunction, setup: Setup) -> Renderer {
     Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR).unwrap()
+}
+
+/// Matter lends its colour, with method `histograms`: values are those of a renderer made for it, after edits too, and the picture shows them.
+/// White matter that gives back what it hides has ones, and a picture as without ambient occlusion; red matter leaves red its light and no other.
+#[test]
+fn matter_lends_its_colour() {
+    let gpu = open();
+    let volume = builtin_box("fruit", [17, 14, 15], [1.0; 3]).unwrap();
+    let of_colour = |rgb: [f32; 3]| {
+        let auto = TransferFunction::preset("auto", volume.range()).unwrap();
+        TransferFunction::new(auto.opacity, vec![[0.0, rgb[0], rgb[1], rgb[2]]], None).unwrap()
+    };
+    let bleeding = |bleeding: f32| {
+        let of_method = setup(Method::Histograms, AmbientLight::Uniform);
+        Setup { options: Options { bleeding, ..of_method.options }, ..of_method }
+    };
+    let size = size_mm(&grid_of(&volume));
+    let rig = StereoRig::framing([size.x.into(), size.y.into(), size.z.into()], 20.0, 30.0);
+    let far = 3.0 * rig.position.length();
+    let views = rig.views(1.0, 0.01 * far, far).unwrap();
+    let picture = |renderer: &Renderer, shading: Shading| {
+        renderer.draw(&views, &Look { shading, gain: 1.0, ..Look::default() }, [24, 24]).unwrap().0.colour
+    };
+    let mut renderer = made(&gpu, &volume, &of_colour([1.0; 3]), bleeding(0.0));
+    let grey = updated(&mut renderer);
+    for (rgb, share) in [([1.0; 3], 1.0), ([1.0, 0.0, 0.0], 1.0), ([1.0, 0.5, 0.0], 0.5)] {
+        renderer.set_transfer(of_colour(rgb)).unwrap();
+        renderer.set_setup(bleeding(share)).unwrap();
+        let found = updated(&mut renderer);
+        assert!(found == updated(&mut made(&gpu, &volume, &of_colour(rgb), bleeding(share))), "{rgb:?}");
+        if rgb == [1.0; 3] {
+            assert!(found.iter().all(|c| *c == [1.0_f32.to_bits(); 3]));
+            assert!(picture(&renderer, Shading::Ao) == picture(&renderer, Shading::None));
+        } else {
+            // Black in blue: as without bleeding.
+            assert!(found.iter().zip(&grey).all(|(c, grey)| c[2] == grey[2] && c[0] >= c[2]), "{rgb:?}");
+            assert!(found.iter().any(|c| c[0] > c[2]), "{rgb:?}");
+        }
+        if rgb == [1.0, 0.0, 0.0] {
+            // Of red matter only red is seen, and that has its light.
+            assert!(picture(&renderer, Shading::Ao) == picture(&renderer, Shading::None));
+            renderer.set_setup(bleeding(0.0)).unwrap();
+            assert!(updated(&mut renderer) == grey);
+            assert!(picture(&renderer, Shading::Ao) != picture(&renderer, Shading::None));
+        }
+    }
+    // An edit of colours alone.
+    renderer.set_transfer(of_colour([0.0, 1.0, 0.0])).unwrap();
+    let found = updated(&mut renderer);
+    assert!(found.iter().zip(&grey).all(|(c, grey)| c[0] == grey[0]) && found.iter().any(|c| c[1] > c[0]));
+    drop(renderer);
+    close(gpu);
 }

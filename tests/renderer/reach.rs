@@ -1,6 +1,7 @@
 //! How far a change reaches (method.md §5.2), of methods that read boxes: bricks that a value of it can be in are computed, the next are not.
 
 use cao::renderer::{COLOUR, Renderer};
+use cao_model::light::AmbientLight;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::{Levels, Options};
@@ -23,9 +24,10 @@ fn touched(method: Method, levels: Levels, radius_mm: f32, at: [usize; 3]) -> [V
     let grid = Grid { dims: DIMS, spacing: [1.0; 3] };
     let values = (0..grid.len()).map(|i| 4 + (i * 7 % 11) as u8).collect();
     let volume = Volume::new(DIMS, grid.spacing, Values::U8(values)).unwrap();
-    let (rays, quadrature) = (method.rays_like(RaySet::W14), method.quadrature());
+    let (rays, quadrature, light) =
+        (method.rays_like(RaySet::W14), method.quadrature(), AmbientLight::Uniform);
     let setup = Setup {
-        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
+        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None, light },
         method,
         options: Options { levels, ..Options::DEFAULT },
         scope: Scope::Needed,

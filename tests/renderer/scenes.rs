@@ -99,6 +99,9 @@ impl Scene {
                     let rule = ["own", "neighbours", "max", "sample"][pick(random, 4)];
                     next.options.set("combine", rule).unwrap();
                 }
+                if next.method.entry().options.contains(&"bleeding") && random.below(2) == 0 {
+                    next.options.set("bleeding", ["0", "0.7"][pick(random, 2)]).unwrap();
+                }
                 if next.method.entry().options.contains(&"levels") && random.below(2) == 0 {
                     let form = ["nbuffer", "mip", "mixed:1", "reversed:2"][pick(random, 4)];
                     next.options.set("levels", form).unwrap();

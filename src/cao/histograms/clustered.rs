@@ -14,7 +14,7 @@ use crate::drive::{Part, Take};
 use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Recorder, Stage};
+use cao_gpu::{Format, Recorder, Stage};
 use cao_model::settings::Setup;
 use std::sync::{Mutex, PoisonError};
 
@@ -40,7 +40,8 @@ fn plan(on: &Subject, setup: &Setup) -> HistogramPlan {
 
 impl Clustered {
     fn scene<'a>(&'a self, on: &'a Subject) -> Scene<'a> {
-        Scene { plan: &self.plan, reference_mm: on.ambient_mm, scope: on.setup.scope }
+        let bleeding = on.setup.options.bleeding;
+        Scene { plan: &self.plan, reference_mm: on.ambient_mm, scope: on.setup.scope, bleeding }
     }
 
     /// Whether the clusters are of something else.
@@ -55,11 +56,15 @@ impl Gather for Clustered {
     const NAME: &str = "histograms";
     const OF_VALUES: bool = true;
 
+    fn format(on: &Subject) -> Format {
+        if on.coloured() { Format::Rgba16Unorm } else { Format::R16Unorm }
+    }
+
     fn new(on: &Subject) -> Result<Self> {
         Ok(Self {
             histogram: Histogram::new(&on.gpu, &on.field, block(on))?,
             clusters: Clusters::new(&on.gpu)?,
-            expand: Expand::new(&on.gpu)?,
+            expand: Expand::new(&on.gpu, on.coloured())?,
             plan: plan(on, &on.setup),
             held: Mutex::new(None),
         })
