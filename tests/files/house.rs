@@ -238,8 +238,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/fit.rs", &["error", "view"]),
     ("src/model/transfer.rs", &["error", "values"]),
     ("src/model/mesh.rs", &["error"]),
-    ("src/model/light.rs", &["error", "occlusion"]),
+    ("src/model/light.rs", &["error"]),
     ("src/model/occlusion.rs", &["error", "light"]),
+    ("src/model/lit.rs", &["error", "light", "occlusion"]),
     ("src/model/samples.rs", &["error"]),
     ("src/model/look.rs", &["error", "samples"]),
     ("src/model/memory.rs", &[]),
@@ -264,7 +265,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
     ("src/formats/light.rs", &["error", "toml_value"]),
     ("src/formats/feature.rs", &["error", "file", "toml_value"]),
-    ("src/formats/scene.rs", &["error", "feature", "file", "light", "obj", "reading", "toml_value", "transfer"]),
+    (
+        "src/formats/scene.rs",
+        &["error", "feature", "file", "light", "obj", "reading", "toml_value", "transfer"],
+    ),
     // The readers of volumes, and what refuses and assembles for all of them.
     ("src/formats/binary.rs", &[]),
     ("src/formats/gzip.rs", &[]),

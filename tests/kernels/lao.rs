@@ -209,7 +209,8 @@ fn directions_weigh_as_light_comes_from_them() {
             assert!(found.iter().zip(other).any(|(f, o)| (f64::from(*f) - o).abs() > 10.0 * tolerance));
         }
     }
-    drop((bench, image, kernels));
+    drop((bench, image));
+    drop(kernels);
     close(gpu);
 }
 
