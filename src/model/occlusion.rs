@@ -265,7 +265,7 @@ impl Occlusion {
     /// and light that does not come along the rays.
     pub fn check(&self, min_spacing: f64) -> Result<()> {
         self.rays.check()?;
-        self.light.check(self.rays)?;
+        self.light.check(&self.rays.name(), &self.rays.directions())?;
         let length = |what: &str, value: Option<f32>, positive: bool| match value {
             Some(v) if !v.is_finite() || v < 0.0 || (positive && v == 0.0) => Err(Error::Config {
                 what: what.into(),

@@ -39,7 +39,17 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
 
     progress.stage("writing");
     targets.write(|files| {
-        files.nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+        if renderer.subject().coloured() {
+            let colours = renderer.read_ambient_colours()?;
+            files.nrrd_colours(
+                &args.output,
+                &volume,
+                &colours,
+                "ambient factor of red, green and blue light",
+            )?;
+        } else {
+            files.nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+        }
         if let Some(path) = &args.opacity_out {
             files.nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
         }
