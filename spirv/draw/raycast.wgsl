@@ -6,6 +6,8 @@
 // With features, `featured`, the volume is that of opacities after features and the transfer function says that its values are opacities, so
 // that voxels are classified first and interpolated then (`features.wgsl`). Colours are those of features, and where a clip hides a place,
 // what of it belongs to a feature that clips leave whole is there all the same.
+//
+// `coloured`: V_AO has red, green and blue (method.md section 2.1).
 
 #include "shared/transfer.wgsl"
 
@@ -325,8 +327,8 @@ fn opacity_sample(opacity: f32) -> Sample {
     return Sample(opacity, 1u, opacity);
 }
 
-// What an eye sees at a place in pixels, up to a view depth. `featured`: of a volume with features.
-fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
+// What an eye sees at a place in pixels, up to a view depth. `featured`: of a volume with features; `coloured`: of V_AO in coloured light.
+fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool, coloured: bool) -> Pixel {
     let ray = ray_through(eye, place / vec2<f32>(params.size));
     let start = ray.start;
     let along = ray.along;
@@ -522,7 +524,7 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool) -> Pixel {
             select(cut, NO_CLIP, only_spared),
             (t_shown - t_cut) * slant,
         );
-        colour += (1.0 - alpha) * stops * shaded(at, ray.direction);
+        colour += (1.0 - alpha) * stops * shaded(at, ray.direction, coloured);
         only_spared = false;
         alpha += (1.0 - alpha) * stops;
         if depth == nothing && alpha >= 0.5 {
@@ -554,7 +556,7 @@ fn is_inside(texel: vec2<u32>) -> bool {
 }
 
 // The mean of a pixel's samples, and the depth of the one nearest to its centre.
-fn pixel_of(texel: vec2<u32>, view: u32, featured: bool) -> Pixel {
+fn pixel_of(texel: vec2<u32>, view: u32, featured: bool, coloured: bool) -> Pixel {
     let centre = vec2<f32>(texel + vec2(0u, params.first_row)) + 0.5;
     var end = 3e38;
     if params.ended == 1u {
@@ -563,7 +565,7 @@ fn pixel_of(texel: vec2<u32>, view: u32, featured: bool) -> Pixel {
     var mean = Pixel(vec4(0.0), 1.0);
     for (var i = 0u; i < frame.samples; i++) {
         let pair = frame.places[i / 2u];
-        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end, featured);
+        let one = seen(frame.eye[view], centre + select(pair.xy, pair.zw, (i & 1u) == 1u), end, featured, coloured);
         mean.colour += frame.share * one.colour;
         if i == 0u {
             mean.depth = one.depth;
@@ -572,42 +574,61 @@ fn pixel_of(texel: vec2<u32>, view: u32, featured: bool) -> Pixel {
     return mean;
 }
 
-@compute @workgroup_size(TILE, TILE)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let texel = texel_of(group, local.xy);
+// A texel of single floats, and one of half floats. `featured`, `coloured`: as `seen` has them.
+fn write_floats(group: vec3<u32>, local: vec2<u32>, featured: bool, coloured: bool) {
+    let texel = texel_of(group, local);
     if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z, false);
+        let pixel = pixel_of(texel, group.z, featured, coloured);
         textureStore(colours, texel, group.z, pixel.colour);
         textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
     }
+}
+
+fn write_halves(group: vec3<u32>, local: vec2<u32>, featured: bool, coloured: bool) {
+    let texel = texel_of(group, local);
+    if is_inside(texel) {
+        let pixel = pixel_of(texel, group.z, featured, coloured);
+        textureStore(half_colours, texel, group.z, pixel.colour);
+        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    write_floats(group, local.xy, false, false);
 }
 
 @compute @workgroup_size(TILE, TILE)
 fn half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let texel = texel_of(group, local.xy);
-    if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z, false);
-        textureStore(half_colours, texel, group.z, pixel.colour);
-        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
-    }
+    write_halves(group, local.xy, false, false);
 }
 
 @compute @workgroup_size(TILE, TILE)
 fn featured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let texel = texel_of(group, local.xy);
-    if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z, true);
-        textureStore(colours, texel, group.z, pixel.colour);
-        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
-    }
+    write_floats(group, local.xy, true, false);
 }
 
 @compute @workgroup_size(TILE, TILE)
 fn featured_half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
-    let texel = texel_of(group, local.xy);
-    if is_inside(texel) {
-        let pixel = pixel_of(texel, group.z, true);
-        textureStore(half_colours, texel, group.z, pixel.colour);
-        textureStore(depths, texel, group.z, vec4(pixel.depth, 0.0, 0.0, 0.0));
-    }
+    write_halves(group, local.xy, true, false);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    write_floats(group, local.xy, false, true);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn coloured_half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    write_halves(group, local.xy, false, true);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    write_floats(group, local.xy, true, true);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn featured_coloured_half_floats(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    write_halves(group, local.xy, true, true);
 }

@@ -1,16 +1,19 @@
 // Which bricks an edit concerns: those within reach of a changed brick that need values, or have some that nothing needs any more
 // (method.md section 5).
 //
-// `spread` is one pass of a separable Euclidean distance transform over bricks, along one axis; the distance between two
-// bricks is that of their nearest voxels. After three passes `choose` decides, and lists the bricks to compute.
+// `spread` is one pass of a separable distance transform over bricks, along one axis; the distance between two bricks is that of their
+// nearest voxels. Where a change reaches in a ball distances are Euclidean. Where it reaches in a box none has a length, and how many bricks
+// are looked at along each axis says it all. After three passes `choose` decides, and lists the bricks to compute.
 
 struct NearParams {
     bricks: vec3<u32>,
     axis: u32,
-    // mm
+    // mm; 0 for a box
     spacing: vec3<f32>,
-    // how far a change of opacity reaches, mm
+    // how far a change of opacity reaches, mm; 0 for a box
     reach: f32,
+    // bricks to look at on each side
+    most: vec3<u32>,
     // 1: voxels that no sample with opacity interpolates get a value too
     unneeded: u32,
 }
@@ -44,8 +47,8 @@ fn spread(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     let stride = vec3(1u, params.bricks.x, params.bricks.x * params.bricks.y)[params.axis];
     let edge = params.spacing[params.axis];
     let first = index - u32(here) * stride;
+    let most = i32(params.most[params.axis]);
     // Bricks n apart have BRICK (n - 1) + 1 voxels' spacing between their nearest voxels.
-    let most = i32(min(params.reach / (f32(BRICK) * edge) + 2.0, f32(size)));
     var least = before.squared[index];
     for (var there = max(here - most, 0); there <= min(here + most, size - 1); there++) {
         let gap = f32(max(i32(BRICK) * abs(there - here) - i32(BRICK - 1u), 0)) * edge;

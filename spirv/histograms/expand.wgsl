@@ -1,5 +1,6 @@
 // From clusters to values: `shade` makes one ambient factor a cluster, of the opacities that the transfer function gives to its values;
 // `main` writes them to the voxels of a list of bricks. Expanded before anything filters them: numbers of clusters cannot be interpolated.
+// `shade_coloured` and `main_coloured` are the same where matter lends its colour: a factor in red, green and blue.
 
 struct ExpandParams {
     dims: vec3<u32>,
@@ -13,6 +14,8 @@ struct ExpandParams {
     unneeded: u32,
     // reference lengths of a voxel's smallest spacing
     exponent: f32,
+    // how much of the light that matter hides it gives back in its own colour
+    bleeding: f32,
 }
 
 struct Range {
@@ -23,6 +26,11 @@ struct Range {
 
 struct Factors {
     all: array<f32>,
+}
+
+struct Tints {
+    // red, green, blue and 1
+    all: array<vec4<f32>>,
 }
 
 #include "shared/solid.wgsl"
@@ -37,9 +45,15 @@ var<immediate> params: ExpandParams;
 @group(0) @binding(5) var<storage, read> list: BrickList;
 @group(0) @binding(6) var index: texture_3d<u32>;
 @group(0) @binding(7) var ambient: texture_storage_3d<r16unorm, write>;
+@group(0) @binding(8) var<storage, read_write> tints: Tints;
+// red, green, blue and 1
+@group(0) @binding(9) var coloured: texture_storage_3d<rgba16unorm, write>;
 
 // Invocations of a workgroup.
 const TEAM = 128u;
+
+// No cluster.
+const NONE = 0xffffffffu;
 
 // Opacity of each bin.
 var<workgroup> alphas: array<f32, BINS>;
@@ -48,16 +62,24 @@ fn value_of(ordered: u32) -> f32 {
     return bitcast<f32>(select(~ordered, ordered & 0x7fffffffu, ordered >> 31u == 1u));
 }
 
+// A bin's own value; the ends exactly.
+fn value_in(bin: u32) -> f32 {
+    let low = value_of(range_of.low);
+    let high = value_of(range_of.high);
+    let t = f32(bin) / f32(BINS - 1u);
+    return select(low * (1.0 - t) + high * t, high, bin == BINS - 1u);
+}
+
+// Of a smallest spacing of a value.
+fn alpha_of(value: f32) -> f32 {
+    let alpha = opacity_of(value);
+    return select(1.0 - pow(max(1.0 - alpha, 0.0), params.exponent), alpha, params.exponent == 1.0);
+}
+
 // One invocation a cluster.
 @compute @workgroup_size(EACH)
 fn shade(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let low = value_of(range_of.low);
-    let high = value_of(range_of.high);
-    // A bin's own value; the ends exactly.
-    let t = f32(lane) / f32(BINS - 1u);
-    let value = select(low * (1.0 - t) + high * t, high, lane == BINS - 1u);
-    let alpha = opacity_of(value);
-    alphas[lane] = select(1.0 - pow(max(1.0 - alpha, 0.0), params.exponent), alpha, params.exponent == 1.0);
+    alphas[lane] = alpha_of(value_in(lane));
     workgroupBarrier();
     if id.x < params.clusters {
         var hidden = 0.0;
@@ -69,6 +91,33 @@ fn shade(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation
     }
 }
 
+// What each bin hides of red, green and blue light, and does not give back.
+var<workgroup> hidden_by: array<vec3<f32>, BINS>;
+
+// One invocation a cluster.
+@compute @workgroup_size(EACH)
+fn shade_coloured(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let value = value_in(lane);
+    hidden_by[lane] = alpha_of(value) * (1.0 - params.bleeding * colour_of(value));
+    workgroupBarrier();
+    if id.x < params.clusters {
+        var hidden = vec3(0.0);
+        for (var w = 0u; w < WORDS; w++) {
+            let word = centres.all[WORDS * id.x + w];
+            hidden += f32(word & 0xffffu) * hidden_by[2u * w] + f32(word >> 16u) * hidden_by[2u * w + 1u];
+        }
+        tints.all[id.x] = vec4(clamp(1.0 - hidden / f32(WHOLE_SHARE), vec3(0.0), vec3(1.0)), 1.0);
+    }
+}
+
+// The cluster of voxel i of a brick; NONE of one that needs no value.
+fn cluster_of(corner: vec3<u32>, i: u32) -> u32 {
+    if params.unneeded == 1u || needed(inside(i)) {
+        return textureLoad(index, (corner + inside(i)) / params.block, 0).r;
+    }
+    return NONE;
+}
+
 @compute @workgroup_size(TEAM)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let entry = params.base + item_of_group(group);
@@ -78,11 +127,31 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {
+            let cluster = cluster_of(corner, i);
             var value = 1.0;
-            if params.unneeded == 1u || needed(inside(i)) {
-                value = factors.all[textureLoad(index, voxel / params.block, 0).r];
+            if cluster != NONE {
+                value = factors.all[cluster];
             }
             textureStore(ambient, voxel, vec4(value, 0.0, 0.0, 0.0));
+        }
+    }
+}
+
+@compute @workgroup_size(TEAM)
+fn main_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let entry = params.base + item_of_group(group);
+    let listed = entry < list.count;
+    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
+    find_solid(corner, lane);
+    for (var i = lane; i < VOXELS; i += TEAM) {
+        let voxel = corner + inside(i);
+        if listed && all(voxel < params.dims) {
+            let cluster = cluster_of(corner, i);
+            var value = vec4(1.0);
+            if cluster != NONE {
+                value = tints.all[cluster];
+            }
+            textureStore(coloured, voxel, value);
         }
     }
 }

@@ -26,7 +26,7 @@ struct ReferenceParams {
 }
 
 struct Directions {
-    // unit vectors in mm space
+    // unit vectors in mm space, and the light from there in shares of the mean
     unit: array<vec4<f32>>,
 }
 
@@ -137,7 +137,8 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if listed && params.samples > 0u {
         let start = points.at[params.base + index].xyz;
         for (var k = lane; k < params.directions; k += LANES) {
-            sum += ray(start, directions.unit[k].xyz * params.per_mm);
+            let direction = directions.unit[k];
+            sum += direction.w * ray(start, direction.xyz * params.per_mm);
         }
     }
     sums[lane] = sum;

@@ -3,6 +3,8 @@
 // numbers, so sums are exact in any order, and a value depends on nothing but the opacities that its rays meet.
 //
 // What a rule of rays is stands in walk.wgsl.
+//
+// The entry points `..._coloured` are the same in coloured light: three sums a voxel.
 
 struct RaysParams {
     dims: vec3<u32>,
@@ -88,4 +90,80 @@ fn hybrid(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
 @compute @workgroup_size(TEAM)
 fn linear(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     work(group, lane, LINEAR);
+}
+
+// In coloured light (method.md section 2.1): what is lost along a direction counts by its weights in red, green and blue. A ray is walked once.
+
+struct Tints {
+    // of each direction, what a lost half cell adds to the sums of red, green and blue; the last is 0
+    all: array<vec4<f32>>,
+}
+
+@group(0) @binding(6) var<storage, read> tints: Tints;
+// red, green, blue and 1
+@group(0) @binding(7) var coloured: texture_storage_3d<rgba16unorm, write>;
+
+// Of each voxel in red, green and blue; as `sums`.
+var<workgroup> coloured_sums: array<atomic<u32>, 3 * VOXELS>;
+
+// One brick, as `work`.
+fn work_coloured(group: vec3<u32>, lane: u32, rule: u32) {
+    let entry = params.base + item_of_group(group);
+    let listed = entry < list.count;
+    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
+    clear_needed(lane);
+    for (var i = lane; i < MEANS; i += TEAM) {
+        cell_means[i] = cells.mean[i];
+    }
+    for (var i = lane; i < 3u * VOXELS; i += TEAM) {
+        atomicStore(&coloured_sums[i], 0u);
+    }
+    workgroupBarrier();
+    mark_rows(corner, lane);
+    workgroupBarrier();
+    for (var i = lane; i < VOXELS; i += TEAM) {
+        if listed && spares(corner, i) {
+            textureStore(coloured, corner + inside(i), vec4(1.0));
+        }
+    }
+    workgroupBarrier();
+    let count = atomicLoad(&found);
+    let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);
+    let whole = WHOLE * (2u * params.cells - 1u);
+    for (var i = lane; i < count * params.directions; i += TEAM) {
+        let slot = i % count;
+        let k = i / count;
+        let lost = whole - traced(corner + place_of(slot), interior, k, rule).sum;
+        if lost > 0u {
+            let of_light = vec3<u32>(f32(lost) * tints.all[k].xyz);
+            atomicAdd(&coloured_sums[slot], of_light.x);
+            atomicAdd(&coloured_sums[VOXELS + slot], of_light.y);
+            atomicAdd(&coloured_sums[2u * VOXELS + slot], of_light.z);
+        }
+    }
+    workgroupBarrier();
+    for (var i = lane; i < count; i += TEAM) {
+        let sum = vec3(
+            atomicLoad(&coloured_sums[i]),
+            atomicLoad(&coloured_sums[VOXELS + i]),
+            atomicLoad(&coloured_sums[2u * VOXELS + i]),
+        );
+        let value = WHOLE - ((sum + FINE / 2u) >> vec3(FINE_BITS));
+        textureStore(coloured, corner + place_of(i), vec4(vec3<f32>(value) / PARTS, 1.0));
+    }
+}
+
+@compute @workgroup_size(TEAM)
+fn nearest_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work_coloured(group, lane, NEAREST);
+}
+
+@compute @workgroup_size(TEAM)
+fn hybrid_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work_coloured(group, lane, HYBRID);
+}
+
+@compute @workgroup_size(TEAM)
+fn linear_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    work_coloured(group, lane, LINEAR);
 }

@@ -23,17 +23,25 @@ fn clear_needed(lane: u32) {
     }
 }
 
+// Finds voxel i of a brick if it needs a value; whether there is one that needs none.
+fn spares(corner: vec3<u32>, i: u32) -> bool {
+    let local = inside(i);
+    if any(corner + local >= params.dims) {
+        return false;
+    }
+    if params.unneeded == 1u || needed(local) {
+        let slot = atomicAdd(&found, 1u);
+        atomicOr(&members[slot >> 1u], i << ((slot & 1u) * 16u));
+        return false;
+    }
+    return true;
+}
+
 // Nothing of a brick that is not `listed`.
 fn gather(corner: vec3<u32>, listed: bool, lane: u32) {
     for (var i = lane; i < VOXELS; i += TEAM) {
-        let local = inside(i);
-        if listed && all(corner + local < params.dims) {
-            if params.unneeded == 1u || needed(local) {
-                let slot = atomicAdd(&found, 1u);
-                atomicOr(&members[slot >> 1u], i << ((slot & 1u) * 16u));
-            } else {
-                textureStore(ambient, corner + local, vec4(1.0, 0.0, 0.0, 0.0));
-            }
+        if listed && spares(corner, i) {
+            textureStore(ambient, corner + inside(i), vec4(1.0, 0.0, 0.0, 0.0));
         }
     }
 }

@@ -3,11 +3,12 @@
 //   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain a, 1) where it is shown, else 1;  A' the same where it multiplies all light
 //
 // Where a surface is, d = max(n.l, 0) and s = d max(n.h, 0)^shininess; where none is, d = 1/2 and s = 0. What a surface is: `steepness`.
-// Just behind a cut or a face of the volume, n is the normal of what cut. a: `air.wgsl`.
+// Just behind a cut or a face of the volume, n is the normal of what cut. a: `air.wgsl`; of coloured light it has red, green and blue.
 // Cost: 26 reads where n is the gradient's, 14 for a.
 
 #include "shared/gradient.wgsl"
 #include "shared/clip_normal.wgsl"
+#include "shared/coloured_air.wgsl"
 
 // A visible place of a ray.
 struct Shown {
@@ -123,11 +124,18 @@ fn reflected_at(at: Shown, direction: vec3<f32>) -> vec2<f32> {
     return mix(inside, back, cut);
 }
 
-// Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length.
-fn shaded(at: Shown, direction: vec3<f32>) -> vec3<f32> {
+// Linear red, green and blue that it sends back along the ray, whose direction in the world may have any length. `coloured`: V_AO is of
+// coloured light.
+fn shaded(at: Shown, direction: vec3<f32>, coloured: bool) -> vec3<f32> {
     var back = vec2(0.0);
     if frame.diffuse + frame.specular > 0.0 {
         back = reflected_at(at, direction);
+    }
+    if coloured && frame.occluded > 0.0 {
+        let open = min(frame.gain * coloured_ambient_at(at.position), vec3(1.0));
+        let open_rest = mix(vec3(1.0), open, frame.occluded_rest);
+        let matt = open * frame.ambient + open_rest * frame.diffuse * back.x;
+        return matt * at.colour + open_rest * frame.specular * back.y;
     }
     var open = 1.0;
     if frame.occluded > 0.0 {

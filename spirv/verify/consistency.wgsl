@@ -12,10 +12,11 @@
 
 #include "shared/eyes.wgsl"
 #include "shared/air.wgsl"
+#include "shared/coloured_air.wgsl"
 
 struct ConsistencyParams {
     count: u32,
-    // 1: V_AO has four channels, of which the least is read
+    // what V_AO has: ONE value, or several, of which the least is read: four of FEATURES, or COLOURS
     channels: u32,
 }
 
@@ -39,6 +40,10 @@ struct AllSeen {
 
 const OUTSIDE = -1.0;
 
+const ONE = 0u;
+const FEATURES = 1u;
+const COLOURS = 2u;
+
 var<immediate> params: ConsistencyParams;
 
 @compute @workgroup_size(64)
@@ -46,7 +51,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= params.count {
         return;
     }
-    channel = select(0u, LEAST, params.channels == 1u);
+    channel = select(0u, LEAST, params.channels == FEATURES);
     let world = points.world[id.x];
     for (var view = 0u; view < 2u; view++) {
         let eye = frame.eye[view];
@@ -71,6 +76,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let a = textureSampleLevel(opacity, field, (ray.start + t * ray.along + 0.5) / frame.dims.xyz, 0.0).r;
             transmittance *= select(pow(1.0 - a, exponent), 0.0, a >= 1.0);
         }
-        seen.by_eye[out] = Seen(transmittance, ambient_at(ray.start + clip.w * ray.along));
+        let place = ray.start + clip.w * ray.along;
+        var read = 0.0;
+        if params.channels == COLOURS {
+            let colours = coloured_ambient_at(place);
+            read = min(colours.r, min(colours.g, colours.b));
+        } else {
+            read = ambient_at(place);
+        }
+        seen.by_eye[out] = Seen(transmittance, read);
     }
 }

@@ -14,7 +14,7 @@ use crate::clip::classify::{AFFECTED, UNTOUCHED};
 use crate::clip::clip_bricks::ClipBricks;
 use crate::drive::{self, Pace, Part, Take};
 use crate::field::bricks::BrickList;
-use crate::field::near::{self, FAR, Near, TODO};
+use crate::field::near::{self, FAR, Near, Reach, TODO};
 use crate::field::ones::Ones;
 use crate::field::{BRICK, Field, volume_image};
 use crate::host::read_buffer;
@@ -32,6 +32,12 @@ pub trait Gather: Send + Sync + Sized {
     const FORMAT: Format = Format::R16Unorm;
     /// Whether values are of V and the transfer function, and not of V_o alone: then an edit of these concerns every one.
     const OF_VALUES: bool = false;
+
+    /// Format of V_AO by these settings, where there are several. Where it is another it is made anew.
+    fn format(on: &Subject) -> Format {
+        let _ = on;
+        Self::FORMAT
+    }
 
     /// For the subject's settings. Uses the device's queue and waits for it.
     ///
@@ -51,8 +57,8 @@ pub trait Gather: Send + Sync + Sized {
     /// As [`Self::set`].
     fn accepts(&self, on: &Subject, setup: &Setup) -> Result<()>;
 
-    /// How far in mm a change of opacity can change values.
-    fn reach_mm(&self) -> f32;
+    /// How far a change of opacity can change values.
+    fn reach(&self) -> Reach;
 
     /// What comes before opacities where settings are new.
     fn settings<'a>(&'a self, on: &'a Subject) -> Option<Part<'a>> {
@@ -66,16 +72,10 @@ pub trait Gather: Send + Sync + Sized {
         None
     }
 
-    /// What it makes of V_o, as it is now and after these changes, in bricks with 0 in `change`, before it computes values of the bricks of any
-    /// list: its own volumes, for instance. As many parts each time: an update that spans frames counts them.
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        change: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
-        let _ = (on, opacity, change, changed);
+    /// What it makes of V_o, after these changes, before it computes values of the bricks of any list: its own volumes, for instance. As many
+    /// parts each time: an update that spans frames counts them.
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
+        let _ = (on, from, changed);
         Vec::new()
     }
 
@@ -85,6 +85,15 @@ pub trait Gather: Send + Sync + Sized {
     /// Computes the listed bricks, or some of them: a value in every voxel that needs one, 1 in the others. Ordered after what
     /// [`Self::prepare`] wrote by its own barriers, V_o is ready to be sampled and read.
     fn record(&self, rec: &mut Recorder, to: &Target, take: &Take) -> Result<()>;
+}
+
+/// V_o as it is now.
+#[derive(Clone, Copy)]
+pub struct Carved<'a> {
+    /// V_o.
+    pub opacity: &'a Image,
+    /// 0 of each brick in which it changed since the last update; says nothing where values are computed anew.
+    pub change: &'a Buffer,
 }
 
 /// What is computed, and where its values go.
@@ -197,7 +206,7 @@ impl<G: Gather> ByBrick<G> {
         let gather = G::new(on)?;
         Ok(Self {
             kernels: Kernels::new(&on.gpu)?,
-            volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::FORMAT)?,
+            volumes: Volumes::new(&on.gpu, &on.field, G::NAME, G::format(on))?,
             gather,
         })
     }
@@ -209,6 +218,10 @@ impl<G: Gather> ByBrick<G> {
 
     fn target<'a>(&'a self, on: &'a Subject, list: &'a BrickList, ambient: &'a Image) -> Target<'a> {
         Target { on, opacity: &self.volumes.opacity, list, ambient }
+    }
+
+    fn carved(&self) -> Carved<'_> {
+        Carved { opacity: &self.volumes.opacity, change: &self.volumes.change }
     }
 
     /// V_o in place, and which bricks changed.
@@ -260,7 +273,7 @@ impl<G: Gather> ByBrick<G> {
                 todo,
                 list: to.list,
             };
-            Ok(k.near.record(rec, &to.on.field, to.on.setup.scope, self.gather.reach_mm(), bindings)?)
+            Ok(k.near.record(rec, &to.on.field, to.on.setup.scope, self.gather.reach(), bindings)?)
         })
     }
 
@@ -298,7 +311,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         if changed.features {
             parts.extend(self.gather.changed(on, &v.change));
         }
-        parts.extend(self.gather.prepare(on, &v.opacity, &v.change, changed));
+        parts.extend(self.gather.prepare(on, self.carved(), changed));
         parts.extend([self.choose(to, &v.todo, Self::anew(changed)), self.compute(to)]);
         parts
     }
@@ -328,7 +341,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         let list = BrickList::new(&on.gpu, &on.field)?;
         let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
         let to = self.target(on, &list, into);
-        let mut parts = self.gather.prepare(on, &v.opacity, &v.change, RECOMPUTED);
+        let mut parts = self.gather.prepare(on, self.carved(), RECOMPUTED);
         parts.extend([self.choose(to, &todo, true), self.compute(to)]);
         let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);

@@ -76,6 +76,16 @@ pub fn read_values(gpu: &Gpu, image: &Image) -> Result<Vec<f32>> {
     })
 }
 
+/// Red, green and blue of an rgba16unorm volume, x fastest; of one with a single value, r32float or r16unorm, that value thrice. Uses the
+/// device's queue and waits for it.
+pub fn read_colours(gpu: &Gpu, image: &Image) -> Result<Vec<[f32; 3]>> {
+    if image.desc().format != Format::Rgba16Unorm {
+        return Ok(read_values(gpu, image)?.into_iter().map(|value| [value; 3]).collect());
+    }
+    let texels = bytemuck::pod_collect_to_vec::<u8, [u16; 4]>(&read_texels(gpu, image)?);
+    Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b].map(|part| f32::from(part) / PARTS)).collect())
+}
+
 /// Content of a buffer. Uses the device's queue and waits for it.
 pub fn read_buffer(gpu: &Gpu, buffer: &Buffer) -> Result<Vec<u8>> {
     let read_back = gpu.buffer("read-back", buffer.bytes(), BufferUse::Readback)?;

@@ -21,14 +21,15 @@ use crate::drive::Pace;
 use crate::field::Field;
 use crate::field::features::FeatureSet;
 use crate::field::volume_image;
-use crate::host::read_values;
+use crate::host::{read_colours, read_values};
 use crate::method;
 use crate::subject::Subject;
 use crate::{Error, Result};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
-use cao_model::methods::Method;
+use cao_model::light::AmbientLight;
+use cao_model::occlusion::Occlusion;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -49,6 +50,11 @@ pub use crate::draw::eyes::{LateViews, Views};
 pub use crate::draw::picture::COLOUR;
 pub use crate::draw::target::{Coding, Over, Place, Target, Targets};
 pub use read_back::StereoImage;
+
+/// Whether volumes and pipelines for the one serve the other.
+fn kept(one: &Setup, other: &Setup) -> bool {
+    one.method == other.method && one.coloured() == other.coloured()
+}
 
 /// Renders one volume.
 pub struct Renderer {
@@ -141,13 +147,13 @@ impl Renderer {
         (self.changed, self.unshown) = (self.changed.and(changed), self.unshown.and(changed));
     }
 
-    /// Changes how occlusion is computed. Uses the device's queue when the method is another: then nothing is occluded until the next
-    /// update has ended. While an update spans frames other settings of the same method wait
+    /// Changes how occlusion is computed. Uses the device's queue when the method is another, or light becomes coloured or ceases to be:
+    /// then nothing is occluded until the next update has ended. While an update spans frames other settings of the same method wait
     /// for its end. On error everything stays as it was.
     pub fn set_setup(&mut self, setup: Setup) -> Result<()> {
         setup.check(f64::from(self.subject.field.min_spacing()))?;
         let before = (self.subject.setup, self.subject.wanted);
-        let waits = self.is_building() && setup.method == before.0.method;
+        let waits = self.is_building() && kept(&before.0, &setup);
         if waits {
             self.ambient.accepts(&self.subject, &setup)?;
         } else {
@@ -157,7 +163,7 @@ impl Renderer {
         let planned = self.subject.planned_clips(method::map_radius(&self.subject));
         let held = planned.and_then(|planned| {
             if !waits {
-                self.hold(before.0.method)?;
+                self.hold(&before.0)?;
             }
             Ok(planned)
         });
@@ -174,9 +180,16 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes what is held fit the setup; of another method nothing is up to date.
-    fn hold(&mut self, before: Method) -> Result<()> {
-        if before == self.subject.setup.method {
+    /// Changes the ambient light, and nothing else of how occlusion is computed: every value is computed anew, opacities stay. As
+    /// [`Self::set_setup`] otherwise.
+    pub fn set_ambient_light(&mut self, light: AmbientLight) -> Result<()> {
+        let setup = *self.setup();
+        self.set_setup(Setup { occlusion: Occlusion { light, ..setup.occlusion }, ..setup })
+    }
+
+    /// Makes what is held fit the setup; of another method, or of light in colours or none, nothing is up to date.
+    fn hold(&mut self, before: &Setup) -> Result<()> {
+        if kept(before, &self.subject.setup) {
             return self.ambient.set(&self.subject);
         }
         self.ambient = method::of(&self.subject)?;
@@ -241,6 +254,22 @@ impl Renderer {
     pub fn read_ambient(&self) -> Result<Vec<f32>> {
         self.current()?;
         Ok(read_values(&self.subject.gpu, self.ambient.fields().ambient)?)
+    }
+
+    /// V_AO in red, green and blue light, x fastest; of light of one colour its value thrice. As [`Self::read_ambient`] otherwise, which has the
+    /// least of the three.
+    ///
+    /// # Errors
+    /// [`cao_model::Error::Config`] with method `fdao`, whose channels are features; and those of the device.
+    pub fn read_ambient_colours(&self) -> Result<Vec<[f32; 3]>> {
+        self.current()?;
+        let ambient = self.ambient.fields().ambient;
+        if ambient.desc().format == Format::Rgba16Unorm && !self.subject.coloured() {
+            let problem =
+                "are of features with method fdao, not of colours; read_ambient has the least of them";
+            return Err(Error::refused("ambient channels", problem));
+        }
+        Ok(read_colours(&self.subject.gpu, ambient)?)
     }
 
     /// V_o after clipping, x fastest. Refuses while out of date, or while an update spans frames. Uses the device's queue and waits for it.

@@ -75,6 +75,11 @@ impl Subject {
         })
     }
 
+    /// Whether V_AO has red, green and blue.
+    pub fn coloured(&self) -> bool {
+        self.setup.coloured()
+    }
+
     /// Reference length of the opacity in mm.
     pub fn reference_mm(&self) -> f32 {
         self.transfer.reference_mm(f64::from(self.field.min_spacing()))

@@ -9,6 +9,7 @@ use cao_model::clip::Shape;
 use cao_model::error::shown_path;
 use cao_model::feature::Features;
 use cao_model::frame::Frame;
+use cao_model::light::{AmbientLight, LIGHTS, Lights};
 use cao_model::methods::{Entry, Method};
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::options::{KEYS, Key, Options};
@@ -161,6 +162,9 @@ pub struct Settings {
     /// Distance in mm between their samples [default: the smallest spacing]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub step_mm: Option<f32>,
+    /// Where ambient light comes from.
+    #[arg(long, value_name = "LIGHT", value_parser = |s: &str| AmbientLight::parse(s), allow_hyphen_values = true, help = light_help())]
+    pub ambient_light: Option<AmbientLight>,
     /// What single methods take beside.
     #[arg(long = "option", value_name = "NAME=VALUE", value_parser = option, help = options_help())]
     pub options: Vec<(String, String)>,
@@ -196,6 +200,18 @@ fn rays_help() -> String {
     format!(
         "Ray set: 6, 14, 26, 54 with equal weights as in the paper; 14w, 26w, 50w weighted; spiral:N for any even N up to {} [default: {defaults}]",
         RaySet::MOST
+    )
+}
+
+fn light_help() -> String {
+    let takers = METHODS.iter().filter(|entry| entry.lights > Lights::Uniform);
+    let takers = takers.map(|entry| match entry.lights {
+        Lights::Coloured => format!("{}, in colours", entry.name),
+        _ => entry.name.to_owned(),
+    });
+    format!(
+        "Where ambient light comes from: {LIGHTS} [default: uniform; others with methods {}]",
+        takers.collect::<Vec<_>>().join(", ")
     )
 }
 
@@ -312,6 +328,7 @@ pub fn setup(settings: &Settings, volume: &Volume, method: Method, all: bool) ->
     occlusion.radius_mm = settings.radius_mm.unwrap_or(occlusion.radius_mm);
     occlusion.offset_mm = settings.offset_mm;
     occlusion.step_mm = settings.step_mm;
+    occlusion.light = settings.ambient_light.unwrap_or_default();
     setup.options = settings.options(setup.options)?;
     setup.check(volume.min_spacing())?;
     Ok(setup)

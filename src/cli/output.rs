@@ -6,6 +6,7 @@ use cao::ambient::Categories;
 use cao_gpu::{Gpu, OpenOptions, Timings};
 use cao_model::error::shown_path;
 use cao_model::feature::Features;
+use cao_model::light::AmbientLight;
 use cao_model::options::Options;
 use cao_model::order::Layout;
 use cao_model::settings::Setup;
@@ -104,14 +105,18 @@ impl Out {
         let (rays, quadrature, spacing) = (o.rays.name(), o.quadrature.name(), volume.min_spacing());
         let (samples, step, first) = (o.samples(spacing), o.step(spacing), o.first(spacing));
         let given = setup.options.other_than(&Options::DEFAULT);
-        let options: String = given.iter().map(|(name, value)| format!(", {name} {value}")).collect();
+        let mut options: String = given.iter().map(|(name, value)| format!(", {name} {value}")).collect();
+        let light = o.light.to_string();
+        if o.light != AmbientLight::Uniform {
+            options += &format!(", light {light}");
+        }
         self.line(format!(
             "method    {methods}, rays {rays}, quadrature {quadrature}{options}, radius {} mm in {samples} steps of {step} mm, first sample at {first} mm",
             o.radius_mm,
         ));
         self.json(json!({
             "rays": rays, "quadrature": quadrature, "radius_mm": o.radius_mm,
-            "samples": samples, "step_mm": step, "first_sample_mm": first,
+            "light": light, "samples": samples, "step_mm": step, "first_sample_mm": first,
             "options": given.into_iter().collect::<std::collections::BTreeMap<_, _>>()
         }));
     }

@@ -15,6 +15,7 @@ mod grid;
 mod gzip;
 pub mod input;
 pub mod label;
+mod light;
 mod listing;
 mod metaimage;
 mod nifti;

@@ -33,6 +33,7 @@
 //!     offset_mm = 0.5                  # where rays start; default: half a step
 //!     step_mm = 1                      # default: the smallest spacing
 //!     ## options = { levels = "mip" }   # what single methods take beside: cao render --help lists them
+//!     light = "sky"                    # where ambient light comes from: "uniform", "sky", { up = [0, 1, 0] }, { sh = [...] }: module `light`
 //!     scope = "needed"                 # voxels that a sample with opacity can touch; "all": every voxel
 //!
 //!     [stereo]
@@ -83,11 +84,12 @@ use toml::Value;
 use crate::feature::FeatureSettings;
 use crate::reading::{NoNumbers, Reading};
 use crate::toml_value::{in_line, number, parse_colour, shown};
-use crate::{Error, Result, file, obj, transfer};
+use crate::{Error, Result, file, light, obj, transfer};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::error::{quoted, shown_path};
 use cao_model::fit::{Fit, Fitting};
 use cao_model::frame::Frame;
+use cao_model::light::AmbientLight;
 use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -193,6 +195,8 @@ pub struct OcclusionSettings {
     pub step_mm: Option<f32>,
     /// What the method takes beside.
     pub options: Options,
+    /// Ambient light, in the frame's axes.
+    pub light: AmbientLight,
 }
 
 impl Default for OcclusionSettings {
@@ -207,6 +211,7 @@ impl Default for OcclusionSettings {
             offset_mm: None,
             step_mm: None,
             options: Options::DEFAULT,
+            light: AmbientLight::Uniform,
         }
     }
 }
@@ -224,6 +229,7 @@ impl OcclusionSettings {
             radius_mm: self.radius_mm.unwrap_or(usual.occlusion.radius_mm),
             offset_mm: self.offset_mm,
             step_mm: self.step_mm,
+            light: self.light,
         };
         let setup = Setup { occlusion, options: self.options, scope: self.scope, ..usual };
         setup.check(min_spacing).map_err(|error| error.under("occlusion"))?;
@@ -508,6 +514,7 @@ struct OcclusionFile {
     step_mm: Option<f64>,
     options: Option<toml::Table>,
     scope: Option<String>,
+    light: Option<Value>,
 }
 
 #[derive(Deserialize, Default)]
@@ -728,6 +735,7 @@ impl OcclusionFile {
             offset_mm: self.offset_mm.map(|mm| mm as f32),
             step_mm: self.step_mm.map(|mm| mm as f32),
             options,
+            light: self.light.as_ref().map_or(Ok(AmbientLight::Uniform), light::read)?,
         })
     }
 }

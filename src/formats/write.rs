@@ -1,4 +1,4 @@
-//! Volumes as NRRD.
+//! Volumes as NRRD: a value a voxel, or three.
 
 use std::io;
 use std::path::Path;
@@ -26,17 +26,41 @@ impl Outputs {
     /// # Errors
     /// As [`write_nrrd`].
     pub fn nrrd(&mut self, path: &Path, like: &Volume, data: &[f32], content: &str) -> Result<()> {
+        self.values(path, like, data.as_chunks::<1>().0, content)
+    }
+
+    /// The same of red, green and blue a voxel, the fastest axis of four.
+    ///
+    /// # Errors
+    /// As [`write_nrrd`].
+    pub fn nrrd_colours(
+        &mut self,
+        path: &Path,
+        like: &Volume,
+        data: &[[f32; 3]],
+        content: &str,
+    ) -> Result<()> {
+        self.values(path, like, data, content)
+    }
+
+    fn values<const N: usize>(
+        &mut self,
+        path: &Path,
+        like: &Volume,
+        data: &[[f32; N]],
+        content: &str,
+    ) -> Result<()> {
         if data.len() != like.len() {
             let problem = format!("{} values, expected {} as the volume has voxels", data.len(), like.len());
             return Err(Error::refused(&format!("values for {}", shown_path(path)), problem));
         }
         self.write(path, |out| {
-            out.write_all(header(like, content).as_bytes())?;
+            out.write_all(header(like, content, N > 1).as_bytes())?;
             const PIECE: usize = 1 << 16;
-            let mut bytes = Vec::with_capacity(PIECE);
+            let mut bytes = Vec::with_capacity(PIECE + 4 * N);
             like.stored_places().try_for_each(|place| {
-                bytes.extend(data[place].to_le_bytes());
-                if bytes.len() == PIECE {
+                bytes.extend(data[place].iter().flat_map(|value| value.to_le_bytes()));
+                if bytes.len() >= PIECE {
                     out.write_all(&bytes)?;
                     bytes.clear();
                 }
@@ -47,7 +71,8 @@ impl Outputs {
     }
 }
 
-fn header(like: &Volume, content: &str) -> String {
+/// Of a value a voxel, or of `coloured` ones.
+fn header(like: &Volume, content: &str, coloured: bool) -> String {
     let Layout { dims: [x, y, z], spacing, origin, directions } = like.stored_layout();
     let mut text = String::from("NRRD0004\n");
     // A line end would end the field, and an empty line the header.
@@ -55,7 +80,13 @@ fn header(like: &Volume, content: &str) -> String {
     if !content.is_empty() {
         text += &format!("content: {content}\n");
     }
-    text += &format!("type: float\ndimension: 3\nsizes: {x} {y} {z}\n");
+    // An axis of colours has no place in space.
+    let [size, direction, spacing_of, kind] = match coloured {
+        true => ["3 ", "none ", "NaN ", "RGB-color "],
+        false => [""; 4],
+    };
+    let dimension = if coloured { 4 } else { 3 };
+    text += &format!("type: float\ndimension: {dimension}\nsizes: {size}{x} {y} {z}\n");
     let placed = like.space != Space::Unknown || origin != [0.0; 3] || directions != IDENTITY;
     if placed {
         // `space` must stand before the fields that use it.
@@ -64,13 +95,13 @@ fn header(like: &Volume, content: &str) -> String {
             Space::Unknown => "space dimension: 3\n",
         };
         let axis = |a: usize| vector(directions[a].map(|d| d * spacing[a]));
-        text += &format!("space directions: {} {} {}\n", axis(0), axis(1), axis(2));
+        text += &format!("space directions: {direction}{} {} {}\n", axis(0), axis(1), axis(2));
         text += &format!("space origin: {}\n", vector(origin));
     } else {
         let [x, y, z] = spacing;
-        text += &format!("spacings: {x} {y} {z}\n");
+        text += &format!("spacings: {spacing_of}{x} {y} {z}\n");
     }
-    text + "kinds: domain domain domain\nendian: little\nencoding: raw\n\n"
+    text + &format!("kinds: {kind}domain domain domain\nendian: little\nencoding: raw\n\n")
 }
 
 fn vector([x, y, z]: [f64; 3]) -> String {

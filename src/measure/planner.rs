@@ -37,7 +37,7 @@ const VOXELS: usize = 48;
 
 /// Fine enough: at 512 directions and four steps a voxel the reference itself moves by some 0.001 when both are doubled, which adds less
 /// than a twentieth to the error of the most accurate settings.
-const REFERENCE: Plan = Plan { directions: 512, steps_per_voxel: 4, max_voxels: usize::MAX };
+const REFERENCE: Plan = Plan { directions: 512, steps_per_voxel: 4, max_voxels: usize::MAX, ..Plan::FULL };
 
 /// A time budget must be this much longer than the time that is foreseen.
 pub const TIME_MARGIN: f64 = 1.25;
@@ -116,7 +116,8 @@ pub fn candidates(
         None => stands_for(entry.same_values_as, setup.method) == entry.method,
     };
     let mut list = Vec::new();
-    for entry in METHODS.iter().filter(chosen) {
+    let lit = |entry: &&Entry| entry.lights >= setup.occlusion.light.needs();
+    for entry in METHODS.iter().filter(chosen).filter(lit) {
         // Who asks for rays does not ask for a method without any; sets that a method does not list are for who asks for them.
         if rays.is_some_and(|rays| !entry.method.follows(rays)) {
             continue;
@@ -452,7 +453,7 @@ impl<'a> Probed<'a> {
             f64::from(like.radius_mm),
             offset,
             self.probe.reference_mm().into(),
-            &REFERENCE,
+            &Plan { light: like.light, ..REFERENCE },
             progress,
         )?;
         let parts = counting.iter().zip(compared).zip(reference);

@@ -13,6 +13,7 @@ use cao::drive::in_parts;
 use cao::field::Field;
 use cao::gpu;
 use cao_gpu::Gpu;
+use cao_model::light::AmbientLight;
 use cao_model::occlusion::Integral;
 use cao_model::values::Values;
 use cao_model::view::View;
@@ -31,13 +32,16 @@ pub struct Plan {
     pub steps_per_voxel: u32,
     /// Most voxels to compute; where more count, a stratified sample of them.
     pub max_voxels: usize,
+    /// Where light comes from; of one colour.
+    pub light: AmbientLight,
 }
 
 impl Plan {
     /// measure.md §1: at least 1000 directions, steps of an eighth of a voxel, every voxel that counts.
-    pub const FULL: Self = Self { directions: 1000, steps_per_voxel: 8, max_voxels: usize::MAX };
+    pub const FULL: Self =
+        Self { directions: 1000, steps_per_voxel: 8, max_voxels: usize::MAX, light: AmbientLight::Uniform };
     /// For a first look: some thousand voxels at a quarter of the directions and twice the step.
-    pub const QUICK: Self = Self { directions: 256, steps_per_voxel: 4, max_voxels: 4000 };
+    pub const QUICK: Self = Self { directions: 256, steps_per_voxel: 4, max_voxels: 4000, ..Self::FULL };
 }
 
 /// Voxels, or pixels, that are computed once more at twice the resolution.
@@ -88,7 +92,8 @@ pub fn literal(
     plan: &Plan,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Reference> {
-    let integral = Integral::literal(radius_mm, plan.directions, grid.min_spacing());
+    let literal = Integral::literal(radius_mm, plan.directions, grid.min_spacing());
+    let integral = Integral { light: plan.light, ..literal };
     check("radius_mm", radius_mm, 0.0)?;
     volume(gpu, grid, opacity, integral, reference_mm, plan, progress)
 }
@@ -161,7 +166,9 @@ fn integral(radius_mm: f64, offset_mm: f64, grid: &Grid, plan: &Plan) -> Result<
     check("radius_mm", radius_mm, 0.0)?;
     check("offset_mm", offset_mm, 0.0)?;
     check("steps_per_voxel", plan.steps_per_voxel.into(), 1.0)?;
-    Ok(Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, grid.min_spacing()))
+    let smallest = grid.min_spacing();
+    let ambient = Integral::ambient(radius_mm, offset_mm, plan.steps_per_voxel, plan.directions, smallest);
+    Ok(Integral { light: plan.light, ..ambient })
 }
 
 fn check(what: &str, value: f64, least: f64) -> Result<()> {
@@ -356,7 +363,7 @@ impl<'a> Scene<'a> {
         if positions.is_empty() {
             return Ok((Vec::new(), 0.0));
         }
-        let points = Points::upload(self.gpu, positions, integral.directions)?;
+        let points = Points::upload(self.gpu, positions, integral)?;
         // The first part is small enough for any device.
         let samples = f64::from(integral.directions) * f64::from(integral.samples.max(1));
         let first = (4e6 / samples).clamp(1.0, 1e6) as u32;

@@ -5,6 +5,7 @@
 //! before they reach a renderer, which knows nothing of it.
 
 use crate::clip::{Clip, Pose};
+use crate::light::AmbientLight;
 use crate::look::{LightFrom, Look};
 use crate::view::StereoRig;
 use crate::volume::{Space, Volume};
@@ -129,6 +130,11 @@ impl Turn {
             up: self.vector(rig.up),
             ..*rig
         }
+    }
+
+    /// The ambient light.
+    pub fn ambient_light(self, light: &AmbientLight) -> AmbientLight {
+        if self == Self::NONE { *light } else { light.turned(DMat3::from_quat(self.0)) }
     }
 
     /// The light; the head's is turned with the eyes.

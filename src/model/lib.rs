@@ -9,6 +9,8 @@ pub mod error;
 pub mod feature;
 pub mod fit;
 pub mod frame;
+pub mod light;
+pub mod lit;
 pub mod look;
 pub mod memory;
 pub mod mesh;

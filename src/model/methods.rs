@@ -2,6 +2,7 @@
 //! `cao::method` has a constructor for each.
 
 use crate::error::quoted;
+use crate::light::Lights;
 use crate::occlusion::{Quadrature, RaySet};
 use crate::options::Options;
 use crate::{Error, Result};
@@ -54,6 +55,8 @@ pub struct Entry {
     pub options: &'static [&'static str],
     /// Options that charts and the planner try, names and values; the first is none, the method as it is.
     pub variants: &'static [&'static [(&'static str, &'static str)]],
+    /// The ambient lights that it follows.
+    pub lights: Lights,
     /// Whether an update computes only what a change affects; else everything.
     pub contextual: bool,
     /// The method whose values it has, bit for bit; itself where no other has them.
@@ -73,6 +76,7 @@ pub static METHODS: &[Entry] = &[
         sets: &[RaySet::None],
         options: &[],
         variants: &[&[]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Sat,
     },
@@ -87,6 +91,7 @@ pub static METHODS: &[Entry] = &[
         sets: &[RaySet::None],
         options: &["shells"],
         variants: &[&[], &[("shells", "4")], &[("shells", "8")], &[("shells", "32")]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Shells,
     },
@@ -101,6 +106,7 @@ pub static METHODS: &[Entry] = &[
         sets: &[RaySet::W26, RaySet::W50, RaySet::Spiral(96)],
         options: &[],
         variants: &[&[]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Vicinity,
     },
@@ -113,8 +119,9 @@ pub static METHODS: &[Entry] = &[
         rays: RaySet::None,
         quadratures: &[Quadrature::Histogram],
         sets: &[RaySet::None],
-        options: &["clusters"],
+        options: &["clusters", "bleeding"],
         variants: &[&[]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Histograms,
     },
@@ -130,6 +137,7 @@ pub static METHODS: &[Entry] = &[
         sets: &[RaySet::Spiral(50)],
         options: &["combine"],
         variants: &[&[]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::FeatureDriven,
     },
@@ -151,6 +159,7 @@ pub static METHODS: &[Entry] = &[
             &[("normal", "1")],
             &[("levels", "mip"), ("normal", "1")],
         ],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Spao,
     },
@@ -165,6 +174,7 @@ pub static METHODS: &[Entry] = &[
         sets: &[RaySet::W14, RaySet::W26],
         options: &[],
         variants: &[&[]],
+        lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Cones,
     },
@@ -179,6 +189,7 @@ pub static METHODS: &[Entry] = &[
         sets: &RaySet::ALL,
         options: &[],
         variants: &[&[]],
+        lights: Lights::Grey,
         contextual: false,
         same_values_as: Method::Lao,
     },
@@ -193,6 +204,7 @@ pub static METHODS: &[Entry] = &[
         sets: &RaySet::ALL,
         options: &[],
         variants: &[&[]],
+        lights: Lights::Grey,
         contextual: true,
         same_values_as: Method::Lao,
     },
@@ -213,6 +225,7 @@ pub static METHODS: &[Entry] = &[
         ],
         options: &[],
         variants: &[&[]],
+        lights: Lights::Coloured,
         contextual: true,
         same_values_as: Method::Rays,
     },
@@ -331,7 +344,7 @@ mod tests {
             }
             let like = entry.method.values().entry();
             assert_eq!(like.same_values_as, like.method, "{}: whose values are a third's", entry.name);
-            assert_eq!(like.quadratures, entry.quadratures, "{}", entry.name);
+            assert_eq!((like.quadratures, like.lights), (entry.quadratures, entry.lights), "{}", entry.name);
         }
     }
 

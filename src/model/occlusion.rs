@@ -1,8 +1,8 @@
 //! What is computed at a voxel: ray sets, quadrature along a ray, radius, start offset (method.md §2–§4).
 
 use crate::error::quoted;
+use crate::light::AmbientLight;
 use crate::{Error, Result};
-use glam::Vec3;
 
 /// Directions of the rays cast from every voxel.
 ///
@@ -122,12 +122,6 @@ impl RaySet {
             Self::Spiral(_) | Self::None => &[],
         };
         orbits.iter().flat_map(|&(v, weight)| orbit(v).into_iter().map(move |d| (d, weight))).collect()
-    }
-
-    /// [`Self::directions`] in f32.
-    pub fn unit_vectors(self) -> Vec<(Vec3, f32)> {
-        let rounded = |(v, weight): ([f64; 3], f64)| (Vec3::from_array(v.map(|c| c as f32)), weight as f32);
-        self.directions().into_iter().map(rounded).collect()
     }
 }
 
@@ -250,6 +244,8 @@ pub struct Occlusion {
     pub offset_mm: Option<f32>,
     /// Distance in mm between samples; `None` is the smallest spacing.
     pub step_mm: Option<f32>,
+    /// Where light comes from: what directions weigh.
+    pub light: AmbientLight,
 }
 
 impl Occlusion {
@@ -261,12 +257,15 @@ impl Occlusion {
             radius_mm: (20.0 * min_spacing) as f32,
             offset_mm: None,
             step_mm: None,
+            light: AmbientLight::Uniform,
         }
     }
 
-    /// Refuses lengths that are negative, not finite, or ask for more than [`Self::MAX_SAMPLES`] a ray, and spirals that there are none of.
+    /// Refuses lengths that are negative, not finite, or ask for more than [`Self::MAX_SAMPLES`] a ray, spirals that there are none of,
+    /// and light that does not come along the rays.
     pub fn check(&self, min_spacing: f64) -> Result<()> {
         self.rays.check()?;
+        self.light.check(&self.rays.name(), &self.rays.directions())?;
         let length = |what: &str, value: Option<f32>, positive: bool| match value {
             Some(v) if !v.is_finite() || v < 0.0 || (positive && v == 0.0) => Err(Error::Config {
                 what: what.into(),
@@ -331,6 +330,8 @@ pub struct Integral {
     pub step_mm: f64,
     /// Samples of a ray; 0 leaves every point unoccluded.
     pub samples: u32,
+    /// Where light comes from; of one colour.
+    pub light: AmbientLight,
 }
 
 /// What the samples of a reference's ray become.
@@ -357,13 +358,15 @@ impl Integral {
         let samples = (length / min_spacing * f64::from(steps_per_voxel) - 1e-6).ceil().max(0.0);
         let step_mm = if samples > 0.0 { length / samples } else { min_spacing };
         let first_mm = offset_mm + 0.5 * step_mm;
-        Self { rule: Rule::Ambient, directions, first_mm, step_mm, samples: samples as u32 }
+        let light = AmbientLight::Uniform;
+        Self { rule: Rule::Ambient, directions, first_mm, step_mm, samples: samples as u32, light }
     }
 
     /// What CAO eq. (2) and (3) converge to with ever more rays: its sum at steps of the smallest spacing.
     pub fn literal(radius_mm: f64, directions: u32, min_spacing: f64) -> Self {
         let samples = (radius_mm / min_spacing).round() as u32;
-        Self { rule: Rule::Literal, directions, first_mm: min_spacing, step_mm: min_spacing, samples }
+        let (first_mm, step_mm, light) = (min_spacing, min_spacing, AmbientLight::Uniform);
+        Self { rule: Rule::Literal, directions, first_mm, step_mm, samples, light }
     }
 
     /// The same at twice the resolution: twice the directions, and for [`Rule::Ambient`] half the step.

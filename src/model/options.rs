@@ -14,6 +14,8 @@ pub struct Options {
     pub shells: u32,
     /// Clusters of `histograms`, 1 … [`Self::MOST_CLUSTERS`].
     pub clusters: u32,
+    /// How much of the light that matter hides it gives back in its own colour, of `histograms`, 0 … 1.
+    pub bleeding: f32,
     /// Which of the features around it shades a place, of `fdao`.
     pub combine: Combine,
 }
@@ -56,7 +58,7 @@ pub struct Key {
 }
 
 /// Every option.
-pub static KEYS: [Key; 5] = [
+pub static KEYS: [Key; 6] = [
     Key {
         name: "levels",
         takes: "nbuffer, mip, mixed:N or reversed:N, N 1 to 9",
@@ -106,6 +108,15 @@ pub static KEYS: [Key; 5] = [
         },
     },
     Key {
+        name: "bleeding",
+        takes: "a number, 0 to 1",
+        get: |o| o.bleeding.to_string(),
+        set: |o, text| {
+            o.bleeding = text.parse().ok().filter(|share| (0.0..=1.0).contains(share))?;
+            Some(())
+        },
+    },
+    Key {
         name: "combine",
         takes: "own, neighbours, max or sample",
         get: |o| {
@@ -142,8 +153,14 @@ impl Default for Options {
 
 impl Options {
     /// What every method starts from.
-    pub const DEFAULT: Self =
-        Self { levels: Levels::Nbuffer, normal: 0.0, shells: 16, clusters: 1024, combine: Combine::Sample };
+    pub const DEFAULT: Self = Self {
+        levels: Levels::Nbuffer,
+        normal: 0.0,
+        shells: 16,
+        clusters: 1024,
+        bleeding: 0.0,
+        combine: Combine::Sample,
+    };
     /// Most shells.
     pub const MOST_SHELLS: u32 = 64;
     /// Most clusters.
@@ -197,6 +214,7 @@ mod tests {
             ("normal", "0.5"),
             ("shells", "4"),
             ("clusters", "256"),
+            ("bleeding", "0.25"),
             ("combine", "max"),
         ];
         let options = Options::default().with(&given).unwrap();
@@ -219,6 +237,7 @@ mod tests {
             ("normal", "-1", "0 to 4"),
             ("shells", "65", "1 to 64"),
             ("clusters", "0", "1 to 4096"),
+            ("bleeding", "1.5", "0 to 1"),
             ("combine", "mean", "neighbours"),
         ] {
             let error = Options::default().with(&[(name, value)]).unwrap_err().to_string();

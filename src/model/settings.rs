@@ -1,6 +1,7 @@
 //! How occlusion is computed: everything that a renderer can be told about it, as plain data.
 
-use crate::methods::Method;
+use crate::light::Lights;
+use crate::methods::{METHODS, Method};
 use crate::occlusion::{Occlusion, RaySet};
 use crate::options::Options;
 use crate::{Error, Result};
@@ -36,7 +37,7 @@ impl Setup {
         }
     }
 
-    /// Refuses lengths and rays that there are none of, and a rule, rays or an option that the method does not have.
+    /// Refuses lengths, rays and lights that there are none of, and a rule, rays, a light or an option that the method does not have.
     ///
     /// # Errors
     /// As [`Occlusion::check`], and [`Error::Config`] naming what the method has not, and what it has.
@@ -63,6 +64,15 @@ impl Setup {
             };
             return Err(Error::refused("rays", problem));
         }
+        let needs = self.occlusion.light.needs();
+        if entry.lights < needs {
+            let having = METHODS.iter().filter(|entry| entry.lights >= needs).map(|entry| entry.name);
+            let (what, having) = (needs.name(), having.collect::<Vec<_>>().join(", "));
+            let has = entry.lights.name();
+            let problem =
+                format!("{what}, but method {} has {has} only; methods with it: {having}", entry.name);
+            return Err(Error::refused("light", problem));
+        }
         for (name, _) in self.options.other_than(&Options::DEFAULT) {
             if !entry.options.contains(&name) {
                 let has = match entry.options {
@@ -74,6 +84,11 @@ impl Setup {
             }
         }
         Ok(())
+    }
+
+    /// Whether V_AO has red, green and blue: in coloured light, and where matter lends its colour.
+    pub fn coloured(&self) -> bool {
+        self.occlusion.light.needs() == Lights::Coloured || self.options.bleeding > 0.0
     }
 
     /// The default method: what to use where the paper's numbers are not the point.
@@ -204,5 +219,36 @@ impl MapSettings {
             return refuse("layer pairs", format!("{}; expected 1 … {}", self.pairs, Self::MAX_PAIRS));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::{AmbientLight, Lights};
+
+    /// By name, and with the methods that have it.
+    #[test]
+    fn a_method_without_a_light_says_which_have_it() {
+        let coloured = AmbientLight::harmonics(&[[3.0; 3], [0.5, 0.0, -0.5]]).unwrap();
+        for entry in METHODS {
+            for (light, needs, having) in [
+                (AmbientLight::Uniform, Lights::Uniform, ""),
+                (AmbientLight::SKY, Lights::Grey, "methods with it: lao, cao, rays"),
+                (coloured, Lights::Coloured, "methods with it: rays"),
+            ] {
+                let mut setup = Setup::of(entry.method, 1.0);
+                setup.occlusion.light = light;
+                match setup.check(1.0) {
+                    Ok(()) => assert!(entry.lights >= needs, "{} {needs:?}", entry.name),
+                    Err(error) => {
+                        let said = error.to_string();
+                        assert!(entry.lights < needs, "{} {needs:?}", entry.name);
+                        let told = said.starts_with("light: ") && said.ends_with(having);
+                        assert!(told && said.contains(entry.name) && said.contains(needs.name()), "{said}");
+                    }
+                }
+            }
+        }
     }
 }

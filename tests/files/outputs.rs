@@ -2,6 +2,8 @@
 
 use cao_formats::{GrowingPng, Outputs, Picture, input};
 use cao_model::error::shown_path;
+use cao_model::values::Values;
+use cao_model::volume::Volume;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -127,4 +129,24 @@ fn a_picture_that_grows_is_the_whole_one() {
         let error = grow(wrong).unwrap_err().to_string();
         assert!(error.contains("grown.png") && !path.exists(), "{error}");
     }
+}
+
+#[test]
+fn colours_are_an_axis_of_a_nrrd_file_without_a_place_in_space() {
+    let volume = Volume::new([2, 3, 1], [1.0, 0.5, 2.0], Values::U8(vec![0; 6])).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("colours.nrrd");
+    let colours: Vec<[f32; 3]> = (0..6_u8).map(|i| [0.25, 1.0, 0.1].map(|c| c * f32::from(i))).collect();
+    let mut outputs = Outputs::default();
+    let few = outputs.nrrd_colours(&path, &volume, &colours[1..], "c").unwrap_err().to_string();
+    assert!(few.contains("5 values, expected 6"), "{few}");
+    outputs.nrrd_colours(&path, &volume, &colours, "c").unwrap();
+    outputs.commit().unwrap();
+    let found = fs::read(&path).unwrap();
+    let header = "NRRD0004\ncontent: c\ntype: float\ndimension: 4\nsizes: 3 2 3 1\nspacings: NaN 1 0.5 2\n\
+        kinds: RGB-color domain domain domain\nendian: little\nencoding: raw\n\n";
+    let (text, values) = found.split_at(header.len());
+    assert_eq!(String::from_utf8_lossy(text), header);
+    let bytes: Vec<u8> = colours.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    assert_eq!(values, bytes);
 }

@@ -227,6 +227,7 @@ fn occlusion(voxels: f32, grid: &Grid) -> Occlusion {
         radius_mm: voxels * grid.min_spacing() as f32,
         offset_mm: None,
         step_mm: None,
+        ..Occlusion::paper(1.0)
     }
 }
 

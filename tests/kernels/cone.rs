@@ -52,7 +52,7 @@ fn computed(
     run(gpu, |rec| {
         make.record_table(rec, &levels.plan).unwrap();
         kernel.record_cones(rec, &plan).unwrap();
-        for part in make.parts(exponent, &levels, &image) {
+        for part in make.parts(exponent, &levels, &image, None) {
             part.record(rec, &Take::All).unwrap();
         }
         let b = Bindings { opacity: &image, make: &make, levels: &levels, list: &list, ambient: &ambient };
@@ -99,6 +99,7 @@ fn cones_equal_their_twin_in_any_order() {
                 radius_mm: mm(voxels),
                 offset_mm: offset.map(mm),
                 step_mm: None,
+                ..Occlusion::paper(1.0)
             };
             let reference_mm = reference * grid.min_spacing();
             let scope = if random.below(2) == 0 { Scope::Needed } else { Scope::All };

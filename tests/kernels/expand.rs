@@ -14,7 +14,7 @@ use cao_model::settings::Scope;
 use cao_model::transfer::TransferFunction;
 use cao_testing::*;
 use cao_twin::Grid;
-use cao_twin::histograms::expand::factor;
+use cao_twin::histograms::expand::{coloured, factor};
 
 /// V_AO is rounded to 65535ths, and 64 products are summed before.
 const ROUNDED: f64 = 4.0 / 65535.0;
@@ -24,9 +24,23 @@ fn values(
     grid: &Grid,
     values: Vec<f32>,
     transfer: &TransferFunction,
-    [clusters, block]: [u32; 2],
+    clusters: [u32; 2],
     reference_mm: f32,
 ) -> (Vec<f64>, Vec<f64>) {
+    let (found, expected) = colours(grid, values, transfer, clusters, reference_mm, None);
+    let first = |all: Vec<[f64; 3]>| all.into_iter().map(|c| c[0]).collect();
+    (first(found), first(expected))
+}
+
+/// The same in red, green and blue, with so much colour bleeding; without any thrice the same.
+fn colours(
+    grid: &Grid,
+    values: Vec<f32>,
+    transfer: &TransferFunction,
+    [clusters, block]: [u32; 2],
+    reference_mm: f32,
+    bleeding: Option<f32>,
+) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
     let gpu = open();
     let range = values.iter().fold([f32::MAX, f32::MIN], |[l, m], v| [l.min(*v), m.max(*v)]);
     let opacity: Vec<u16> =
@@ -34,16 +48,18 @@ fn values(
     let field = Field::upload(&gpu, &volume_of(grid, values)).unwrap();
     let plan = HistogramPlan::new(field.dims, field.spacing, 12.0, clusters, block);
     let histogram = Histogram::new(&gpu, &field, block).unwrap();
-    let (groups, expand) = (Clusters::new(&gpu).unwrap(), Expand::new(&gpu).unwrap());
+    let (groups, expand) = (Clusters::new(&gpu).unwrap(), Expand::new(&gpu, bleeding.is_some()).unwrap());
     let table = TransferBuffer::new(&gpu).unwrap();
-    let image = |name| volume_image(&gpu, name, &field, Format::R16Unorm).unwrap();
-    let (source, ambient) = (image("test opacity"), image("test ambient"));
+    let image = |name, format| volume_image(&gpu, name, &field, format).unwrap();
+    let channels = if bleeding.is_some() { 4 } else { 1 };
+    let format = if bleeding.is_some() { Format::Rgba16Unorm } else { Format::R16Unorm };
+    let (source, ambient) = (image("test opacity", Format::R16Unorm), image("test ambient", format));
     write_image(&gpu, &source, bytemuck::cast_slice(&opacity));
-    write_image(&gpu, &ambient, bytemuck::cast_slice(&vec![7_u16; opacity.len()]));
+    write_image(&gpu, &ambient, bytemuck::cast_slice(&vec![7_u16; channels * opacity.len()]));
     // All but the last brick.
     let listed: Vec<u32> = (0..field.brick_count() - 1).collect();
     let list = BrickList::of(&gpu, &listed).unwrap();
-    let scene = Scene { plan: &plan, reference_mm, scope: Scope::Needed };
+    let scene = Scene { plan: &plan, reference_mm, scope: Scope::Needed, bleeding: bleeding.unwrap_or(0.0) };
     let b = Bindings { opacity: &source, index: &histogram.index, list: &list, ambient: &ambient };
     run(&gpu, |rec| {
         histogram.record_samples(rec, &field, &plan).unwrap();
@@ -62,12 +78,15 @@ fn values(
     let (found, index) = (texels(&ambient), texels(&histogram.index));
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &groups.centres));
     let exponent = grid.min_spacing() / f64::from(reference_mm);
-    let factors: Vec<f64> = words
+    let factors: Vec<[f64; 3]> = words
         .chunks(WORDS as usize)
         .take(plan.clusters as usize)
         .map(|centre| {
             let shares: Vec<u32> = centre.iter().flat_map(|w| [w & 0xffff, w >> 16]).collect();
-            factor(&shares, transfer, range, exponent)
+            match bleeding {
+                None => [factor(&shares, transfer, range, exponent); 3],
+                Some(bleeding) => coloured(&shares, transfer, range, exponent, bleeding.into()),
+            }
         })
         .collect();
     let coarse = Grid { dims: plan.coarse.map(|d| d as usize), ..*grid };
@@ -76,7 +95,10 @@ fn values(
         .collect();
     drop((histogram, groups, expand, table, source, ambient, list, field));
     close(gpu);
-    (found.iter().map(|a| f64::from(*a) / 65535.0).collect(), expected)
+    let found = found
+        .chunks(channels)
+        .map(|texel| [0, 1, 2].map(|c| f64::from(texel[c.min(channels - 1)]) / 65535.0));
+    (found.collect(), expected)
 }
 
 fn ramp(points: Vec<[f32; 2]>) -> TransferFunction {
@@ -122,4 +144,27 @@ fn known_answers() {
     assert!((found[at] - 0.4359).abs() < 0.03, "{}", found[at]);
     // Not needed.
     assert_eq!(found[grid.index([25, 25, 20])], 1.0);
+}
+
+/// Every channel equals the twin's, which has the known answers.
+#[test]
+fn matter_lends_its_colour() {
+    let grid = Grid { dims: [18, 17, 19], spacing: [1.0, 1.0, 1.5] };
+    let made: Vec<f32> = (0..grid.len())
+        .map(|i| {
+            let [x, y, z] = grid.voxel(i);
+            ((x + 3 * y + z * y) % 40) as f32 + if x > 8 { 60.0 } else { 0.0 }
+        })
+        .collect();
+    let points = vec![[20.0, 0.1], [90.0, 0.8]];
+    let colour = vec![[0.0, 1.0, 0.5, 0.0], [60.0, 0.1, 0.4, 0.9], [97.0, 0.9, 0.9, 0.1]];
+    let transfer = TransferFunction::new(points, colour, None).unwrap();
+    let (found, expected) = colours(&grid, made, &transfer, [12, 2], 2.5, Some(0.6));
+    for (i, (f, e)) in found.iter().zip(&expected).enumerate() {
+        let listed = grid.voxel(i).iter().any(|c| *c < 16);
+        let off = (0..3).map(|c| (f[c] - if listed { e[c] } else { 7.0 / 65535.0 }).abs());
+        assert!(off.fold(0.0, f64::max) <= ROUNDED, "{:?}: {f:?} {e:?}", grid.voxel(i));
+    }
+    let apart = |a: usize, b: usize| found.iter().any(|c| (c[a] - c[b]).abs() > 0.01);
+    assert!(apart(0, 1) && apart(1, 2), "no colours");
 }

@@ -166,6 +166,7 @@ fn every_rule_equals_its_twin_in_any_order() {
                     radius_mm: mm(radius.unwrap_or(0.0)),
                     offset_mm: offset.map(mm),
                     step_mm: step.map(mm),
+                    ..Occlusion::paper(1.0)
                 };
                 let reference_mm = reference * occlusion.step(grid.min_spacing());
                 let [opacity, labels] = &images;
@@ -227,6 +228,7 @@ fn one_feature_has_the_values_of_rays_by_brick() {
             radius_mm: 9.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         let plan = RayPlan::new(state.field.spacing, &occlusion).unwrap();
         let asked = |labels, masked| {

@@ -9,6 +9,7 @@ use cao::field::volume_image;
 use cao::stages::{BRICKS, LAO};
 use cao_gpu::{Access, Format, Gpu, Image};
 use cao_measure::random::Random;
+use cao_model::light::AmbientLight;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::Scope;
 use cao_testing::*;
@@ -146,7 +147,10 @@ fn occlusion(rays: RaySet, quadrature: Quadrature, turn: usize, smallest: f64) -
     let (radius, step, offset, reference) = LENGTHS[turn % LENGTHS.len()];
     let mm = |length: f32| length * smallest as f32;
     let (radius_mm, step_mm, offset_mm) = (mm(radius), step.map(mm), offset.map(mm));
-    (Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm }, reference * smallest)
+    (
+        Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm, ..Occlusion::paper(1.0) },
+        reference * smallest,
+    )
 }
 
 /// Opacities up to this are far enough from 1 that no function along a ray has an unbounded slope there.
@@ -183,6 +187,33 @@ fn every_ray_set_and_rule_at_every_length_and_size() {
     close(gpu);
 }
 
+/// In light from above, and in one of harmonics, by the same tolerance; in another light they are not those values.
+#[test]
+fn directions_weigh_as_light_comes_from_them() {
+    let gpu = open();
+    let kernels = Kernels::new(&gpu).unwrap();
+    let grid = GRIDS[3];
+    let bench = Bench::new(&gpu, &kernels, &grid);
+    let opacity = opacities(&mut Random::new(8), &grid, LARGEST);
+    let image = float_image(&gpu, &bench.field, &opacity);
+    for quadrature in Quadrature::CAST {
+        let (even, reference_mm) = occlusion(RaySet::W26, quadrature, 0, grid.min_spacing());
+        for light in [AmbientLight::SKY, coloured_light().channel(2)] {
+            let occlusion = Occlusion { light, ..even };
+            let settings = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };
+            let expected = twin::cast::lao::lao(&grid, &opacity, &occlusion, reference_mm);
+            let tolerance = tolerance(&gpu, &grid, &occlusion, reference_mm, LARGEST.into());
+            let found = bench.run(&image, &settings);
+            compare(&grid, &found, &expected, tolerance, &format!("{occlusion:?}"));
+            let other = twin::cast::lao::lao(&grid, &opacity, &even, reference_mm);
+            assert!(found.iter().zip(other).any(|(f, o)| (f64::from(*f) - o).abs() > 10.0 * tolerance));
+        }
+    }
+    drop((bench, image));
+    drop(kernels);
+    close(gpu);
+}
+
 /// Solid blocks, where rays end. Left and cell rules with a step of one reference length are as good as elsewhere: there
 /// q^1 = q. The segment rule's logarithm is not: see [`OPAQUE_SEGMENT`].
 #[test]
@@ -215,6 +246,7 @@ fn opaque_blocks() {
                 radius_mm: 7.0 * grid.min_spacing() as f32,
                 offset_mm: None,
                 step_mm: None,
+                ..Occlusion::paper(1.0)
             };
             let reference_mm = grid.min_spacing();
             let settings = Settings { occlusion, scope: Scope::All, reference_mm: reference_mm as f32 };

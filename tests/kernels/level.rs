@@ -44,7 +44,7 @@ fn every_cell_equals_the_mean_that_it_stands_for() {
                 run(&gpu, |rec| {
                     rec.discard(&coarser);
                     let finer = made.as_ref().unwrap_or(&image);
-                    make.record(rec, [&plan.cells[l - 1], &now], exponent, finer, &coarser).unwrap();
+                    make.record(rec, [&plan.cells[l - 1], &now], exponent, [finer, &coarser]).unwrap();
                     rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
                 });
                 let found: Vec<u16> = bytemuck::pod_collect_to_vec(&read_image(&gpu, &coarser));

@@ -36,4 +36,5 @@ mod reference;
 mod shading;
 mod ssao;
 mod sums;
+mod tiles;
 mod vicinity;

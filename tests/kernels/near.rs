@@ -1,7 +1,7 @@
 //! The kernel `near` against its twin: which bricks an edit concerns.
 
 use cao::field::bricks::BrickList;
-use cao::field::near::{Bindings, FAR, Near, TODO, VALUED};
+use cao::field::near::{Bindings, FAR, Near, Reach, TODO, VALUED};
 use cao_gpu::BufferUse;
 use cao_measure::random::Random;
 use cao_model::settings::Scope;
@@ -9,7 +9,7 @@ use cao_testing::*;
 use cao_twin::Grid;
 use cao_twin::clip::carve::contact;
 use cao_twin::field::bricks::bricks;
-use cao_twin::field::near::near;
+use cao_twin::field::near::{Reach as TwinReach, near};
 
 #[test]
 fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
@@ -21,14 +21,19 @@ fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
     for grid in GRIDS.iter().chain([&large]) {
         let field = blank(&gpu, grid);
         let all = bricks(grid).len();
-        for turn in 0..12 {
+        for turn in 0..20 {
             // A few voxels with opacity, a few changed bricks.
             let share = [1, 20, 600][turn % 3];
             let opacity: Vec<u16> = (0..grid.len()).map(|_| u16::from(random.below(1000) < share)).collect();
             let changed: Vec<bool> =
                 (0..all).map(|_| random.below(100) < [2, 15, 0, 100][turn % 4]).collect();
             // Not at a multiple of the spacing, where rounding decides.
-            let reach = random.between(0.0, 30.0) + 0.01;
+            let mm = random.between(0.0, 30.0) + 0.01;
+            let voxels = [(); 3].map(|()| random.below(27) as u32);
+            let (reach, twin_reach) = match turn % 2 {
+                0 => (Reach::Ball(mm), TwinReach::Ball(f64::from(mm))),
+                _ => (Reach::Box(voxels), TwinReach::Box(voxels.map(|v| v as usize))),
+            };
             let scope = if turn % 5 == 4 { Scope::All } else { Scope::Needed };
             let bits = contact(grid, &opacity);
             let distance: Vec<u32> = changed.iter().map(|changed| if *changed { 0 } else { FAR }).collect();
@@ -44,10 +49,10 @@ fn chosen_are_the_bricks_within_reach_of_a_change_that_need_values() {
             run(&gpu, |rec| kernel.record(rec, &field, scope, reach, b).unwrap());
 
             let found: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &todo));
-            let expected = near(grid, &opacity, &changed, &valued, f64::from(reach), scope == Scope::All);
+            let expected = near(grid, &opacity, &changed, &valued, twin_reach, scope == Scope::All);
             let word = |[to_do, valued]: [bool; 2]| u32::from(to_do) * TODO + u32::from(valued) * VALUED;
             let words: Vec<u32> = expected.iter().copied().map(word).collect();
-            assert_eq!(found, words, "{grid:?} turn {turn}");
+            assert_eq!(found, words, "{grid:?} turn {turn} {reach:?}");
             // Each once, in any order, and one group for each.
             let mut listed: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &list.buffer));
             let number = expected.iter().filter(|brick| brick[0]).count();

@@ -60,7 +60,7 @@ impl State {
         let exponent = field.min_spacing() / reference_mm as f32;
         run(&self.gpu, |rec| {
             self.make.record_table(rec, &levels.plan).unwrap();
-            for part in self.make.parts(exponent, &levels, &image) {
+            for part in self.make.parts(exponent, &levels, &image, None) {
                 part.record(rec, &Take::All).unwrap();
             }
             let b = Bindings {

@@ -68,6 +68,7 @@ pub fn setup(maps: MapSettings) -> Setup {
             radius_mm: 4.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         },
         method: Method::Cao,
         options: Options::DEFAULT,
@@ -219,6 +220,59 @@ fn pictures_are_those_of_the_twin() {
             );
         }
     }
+    close(gpu);
+}
+
+/// In coloured light, from the device's own V_AO; from the least of its colours it is another picture.
+#[test]
+fn pictures_in_coloured_light_are_those_of_the_twin() {
+    let gpu = open();
+    let volume = builtin_box("fruit", [21, 25, 17], [1.0, 1.2, 1.5]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let clip = Clip {
+        shape: Shape::Sphere,
+        mode: Mode::Remove,
+        pose: Pose { translate_mm: Vec3::new(4.0, -6.0, 5.0), scale: Vec3::splat(7.0), ..Pose::default() },
+    };
+    let mut setup = Setup::of(Method::Rays, volume.min_spacing());
+    (setup.occlusion.light, setup.occlusion.radius_mm) = (coloured_light(), 5.0);
+    let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
+    renderer.set_clips(std::slice::from_ref(&clip)).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let look = Look { step_mm: Some(0.5), gain: 1.0, ..Look::default() };
+    let views = framing(&volume, 40.0, 15.0);
+    let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
+    let grid = grid_of(&volume);
+    let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
+    let colours = renderer.read_ambient_colours().unwrap();
+    let colours: [Vec<f32>; 3] = std::array::from_fn(|c| colours.iter().map(|v| v[c]).collect());
+    let maps = Maps {
+        layers: 4,
+        support: Support::Voxel,
+        resolution: MAPS.resolution,
+        dilation: Dilation::Conservative(MAPS.cells),
+    };
+    let frame = twin::draw::raycast::Frame {
+        grid,
+        values: &values,
+        parts: None,
+        transfer: &transfer,
+        reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
+        ambient: &renderer.read_ambient().unwrap(),
+        clips: &[ClipField::new(&clip, &grid, 5.0, &maps).unwrap()],
+        step_mm: 0.5,
+        look,
+    };
+    let size = SIZE.map(|s| s as usize);
+    let drawn = |eye: usize| twin::draw::raycast::raycast_coloured(&frame, &colours, &views[eye], size);
+    let nearest =
+        views[0].position.length() - 0.5 * Vec3::from_array(volume.size_mm().map(|s| s as f32)).length();
+    compare(&found, &[drawn(0), drawn(1)], &views, 0.5, nearest.max(1.0), "coloured");
+    let grey = twin::draw::raycast::raycast(&frame, &views[0], size);
+    let apart = |(f, g): (&[f32; 4], &[f32; 4])| (0..3).any(|c| (f[c] - g[c]).abs() > COLOUR_TOLERANCE);
+    let other = found.colour[0].iter().zip(&grey.colour).filter(|pair| apart(*pair)).count();
+    assert!(other > 100, "{other} pixels have a colour");
+    drop(renderer);
     close(gpu);
 }
 
@@ -559,6 +613,7 @@ impl Stages {
             values: &self.field.volume,
             features: &self.features,
             ambient: &self.volumes.ambient,
+            coloured: false,
             distances: &distances,
             bounds: &bounds,
             clips: &self.clips,

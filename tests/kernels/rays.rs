@@ -7,6 +7,7 @@ use cao::field::volume_image;
 use cao::rays::rays::{Bindings, RayPlan, Rays};
 use cao_gpu::{Access, DeviceKind, Format, Gpu, Image};
 use cao_measure::random::Random;
+use cao_model::light::AmbientLight;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::Scope;
 use cao_testing::*;
@@ -59,6 +60,23 @@ impl State {
 
     fn plan(&self, occlusion: &Occlusion) -> RayPlan {
         RayPlan::new(self.field.spacing, occlusion).unwrap()
+    }
+
+    /// V_AO in coloured light, red, green, blue and what is in the fourth channel; 7 in what is not written.
+    fn coloured(&self, plan: &RayPlan, asked: Asked, bricks: &[u32]) -> Vec<[u16; 4]> {
+        let kernel = Rays::coloured(&self.gpu).unwrap();
+        let ambient = volume_image(&self.gpu, "test ambient", &self.field, Format::Rgba16Unorm).unwrap();
+        let voxels = self.field.dims.iter().product::<u32>() as usize;
+        write_image(&self.gpu, &ambient, bytemuck::cast_slice(&vec![[7_u16; 4]; voxels]));
+        let list = BrickList::of(&self.gpu, bricks).unwrap();
+        let Asked { opacity, reference_mm, scope } = asked;
+        let b = Bindings { opacity, list: &list, ambient: &ambient };
+        run(&self.gpu, |rec| {
+            kernel.record_directions(rec, plan).unwrap();
+            kernel.record(rec, &self.field, plan, reference_mm, scope, b, &Take::All).unwrap();
+            rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        });
+        bytemuck::pod_collect_to_vec(&read_image(&self.gpu, &ambient))
     }
 
     /// V_AO with 7 in what is not written; of the listed bricks all at once, or in these slices.
@@ -121,7 +139,14 @@ fn settings(
 ) -> Occlusion {
     let mm = |voxels: f64| (voxels * grid.min_spacing()) as f32;
     let radius_mm = mm(radius.unwrap_or(0.0));
-    Occlusion { rays, quadrature, radius_mm, offset_mm: offset.map(mm), step_mm: step.map(mm) }
+    Occlusion {
+        rays,
+        quadrature,
+        radius_mm,
+        offset_mm: offset.map(mm),
+        step_mm: step.map(mm),
+        ..Occlusion::paper(1.0)
+    }
 }
 
 /// `nearest` bit for bit; the filter's rules closely. The same bits whatever the order of bricks, slices and directions.
@@ -186,6 +211,42 @@ fn every_rule_equals_its_twin_in_any_order() {
         state.close();
     }
     println!("worst {worst:?}, mean {:?}", sum.map(|s| s / count));
+}
+
+/// In coloured light one walk has the values of three grey ones, to the bit; `nearest` those of the twin. What needs no value is white.
+#[test]
+fn colours_are_three_grey_lights_of_the_twin() {
+    let mut random = Random::new(16);
+    let grid = Grid { dims: [26, 20, 19], spacing: [1.0, 0.5, 0.8] };
+    let state = State::new(&grid);
+    let opacity = blobs(&mut random, &grid);
+    let image = state.opacity(&opacity);
+    for (rays_of, light) in [
+        (RaySet::Spiral(14), coloured_light()),
+        (RaySet::W26, coloured_light().turned(third_turn())),
+        // Some directions have no light of one colour, and some none at all.
+        (RaySet::Spiral(20), AmbientLight::harmonics(&[[0.0; 3], [1.0, 0.0, 0.5], [0.0, 1.0, 0.5]]).unwrap()),
+    ] {
+        for rule in Quadrature::BRICK {
+            let occlusion = settings(&grid, rays_of, rule, [Some(7.0), None, None]);
+            let (reference_mm, scope) = (occlusion.step(grid.min_spacing()), Scope::Needed);
+            let asked = Asked { opacity: &image, reference_mm, scope };
+            let lit = |light| Occlusion { light, ..occlusion };
+            let found = state.coloured(&state.plan(&lit(light)), asked, &state.all());
+            for c in 0..3 {
+                let grey = lit(light.channel(c));
+                let own = state.computed(&state.plan(&grey), asked, &state.all(), &[]);
+                assert!(found.iter().map(|v| v[c]).eq(own.iter().copied()), "{rule:?} {rays_of:?} {c}");
+                if rule == Quadrature::Nearest {
+                    assert_eq!(own, rays(&grid, &opacity, &grey, reference_mm, false), "{rays_of:?} {c}");
+                }
+            }
+            assert!(found.iter().all(|v| v[3] == 65535));
+            assert!(found.iter().any(|v| v[0] != v[1] && v[1] != v[2]), "{rule:?}: no colours");
+        }
+    }
+    drop(image);
+    state.close();
 }
 
 #[test]

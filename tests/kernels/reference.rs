@@ -7,6 +7,7 @@ use cao_measure::kernels::reference::{Points, Reference, upload_clearance};
 use cao_measure::random::Random;
 use cao_measure::reference;
 use cao_measure::reference::Plan;
+use cao_model::light::AmbientLight;
 use cao_model::look::Look;
 use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
 use cao_model::transfer::TransferFunction;
@@ -53,14 +54,18 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
                 })
             })
             .collect();
-        let on_device = Points::upload(&gpu, &points, 100).unwrap();
         let with_rim: Vec<[f64; 3]> = points.iter().map(|p| p.map(|c| c + 1.0)).collect();
         for integral in [
             Integral::ambient(6.0 * smallest, 0.5 * smallest, 8, 100, smallest),
             Integral::ambient(40.0 * smallest, 0.0, 3, 100, smallest),
             Integral::literal(6.0 * smallest, 100, smallest),
             Integral::ambient(0.0, 0.0, 8, 100, smallest),
+            Integral {
+                light: AmbientLight::Sky([1.0, -2.0, 0.5]),
+                ..Integral::literal(6.0 * smallest, 100, smallest)
+            },
         ] {
+            let on_device = Points::upload(&gpu, &points, &integral).unwrap();
             let reference_mm = 1.3 * smallest;
             let expected =
                 twin::measure::reference::reference(&grid, &opacity, &integral, reference_mm, &with_rim);
@@ -111,7 +116,7 @@ fn the_stated_error_is_the_error() {
     let gpu = open();
     let (grid, opacity) = fruit(20);
     let at = |directions, steps_per_voxel| {
-        let plan = Plan { directions, steps_per_voxel, max_voxels: 400 };
+        let plan = Plan { directions, steps_per_voxel, max_voxels: 400, ..Plan::FULL };
         reference::ambient(&gpu, &grid, &opacity, RADIUS, 0.5, 1.0, &plan, &mut |_| ()).unwrap()
     };
     let [rough, good, truth] = [at(30, 1), at(250, 4), at(2000, 8)];
@@ -132,7 +137,7 @@ fn a_sample_is_part_of_the_whole() {
     let gpu = open();
     let (grid, opacity) = fruit(20);
     let at = |max_voxels| {
-        let plan = Plan { directions: 40, steps_per_voxel: 1, max_voxels };
+        let plan = Plan { directions: 40, steps_per_voxel: 1, max_voxels, ..Plan::FULL };
         let mut last = 0.0;
         let mut progress = |part: f64| {
             assert!(part >= last && part < 1.0 + 1e-9);
@@ -164,7 +169,7 @@ fn a_sample_is_part_of_the_whole() {
 fn the_papers_sum_converges_to_the_literal_reference() {
     let gpu = open();
     let (grid, opacity) = fruit(16);
-    let plan = Plan { directions: 1000, steps_per_voxel: 4, max_voxels: 500 };
+    let plan = Plan { directions: 1000, steps_per_voxel: 4, max_voxels: 500, ..Plan::FULL };
     let literal = reference::literal(&gpu, &grid, &opacity, RADIUS, 1.0, &plan, &mut |_| ()).unwrap();
     let ambient = reference::ambient(&gpu, &grid, &opacity, RADIUS, 0.5, 1.0, &plan, &mut |_| ()).unwrap();
     let error = |rays, to: &reference::Reference| {
@@ -174,6 +179,7 @@ fn the_papers_sum_converges_to_the_literal_reference() {
             radius_mm: RADIUS as f32,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         let found: Vec<f32> =
             twin::cast::lao::lao(&grid, &opacity, &settings, 1.0).into_iter().map(|a| a as f32).collect();
@@ -229,7 +235,7 @@ impl Scene {
         directions: u32,
         steps_per_voxel: u32,
     ) -> reference::ImageReference {
-        let plan = Plan { directions, steps_per_voxel, max_voxels: usize::MAX };
+        let plan = Plan { directions, steps_per_voxel, max_voxels: usize::MAX, ..Plan::FULL };
         reference::image(
             gpu,
             &self.frame(ambient, 1.0),
@@ -299,7 +305,7 @@ fn what_makes_no_sense_is_refused_by_name() {
     let gpu = open();
     let grid = Grid { dims: [4, 3, 2], spacing: [1.0; 3] };
     let opacity = vec![0.5; 24];
-    let plan = Plan { directions: 10, steps_per_voxel: 2, max_voxels: 10 };
+    let plan = Plan { directions: 10, steps_per_voxel: 2, max_voxels: 10, ..Plan::FULL };
     let at = |opacity: &[f32], radius, offset, length, plan: &Plan| {
         reference::ambient(&gpu, &grid, opacity, radius, offset, length, plan, &mut |_| ())
     };

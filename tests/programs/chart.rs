@@ -47,7 +47,8 @@ fn scene(name: &str, edge: usize) -> Scene {
 }
 
 fn plan() -> Plan {
-    let reference = reference::Plan { directions: 200, steps_per_voxel: 4, max_voxels: 300 };
+    let reference =
+        reference::Plan { directions: 200, steps_per_voxel: 4, max_voxels: 300, ..reference::Plan::FULL };
     Plan { quick: true, runs: RUNS, size: [64, 48], pictures: [48, 36], reference }
 }
 

@@ -181,6 +181,7 @@ fn scenes_and_transfer_functions_are_refused_by_file_and_key() {
         (format!("{volume}[[clip]]\nmesh = \"gone.obj\""), &["clip[0].mesh", "gone.obj"]),
         (format!("{volume}[occlusion]\nrays = 27"), &["occlusion.rays", "27", "26"]),
         (format!("{volume}[occlusion]\nradius_mm = -3"), &["occlusion.radius_mm", "-3", "expected"]),
+        (format!("{volume}[occlusion]\nlight = \"sun\""), &["occlusion.light", "sun", "sky"]),
         (format!("{volume}[image]\nwidth = 0"), &["image.width", "0", "expected 1"]),
         (format!("{volume}[stereo]\nfov_deg = 200"), &["stereo.fov_deg", "200", "expected"]),
         (format!("{volume}[stereo]\nipd_mm = nan"), &["stereo.ipd_mm", "expected"]),
@@ -194,6 +195,17 @@ fn scenes_and_transfer_functions_are_refused_by_file_and_key() {
         folder.put("scene.toml", &text);
         let parts = [&["scene.toml"][..], parts].concat();
         refused(&folder, "render scene.toml -o stereo.png --eyes l.png,r.png", FAILURE, &parts);
+    }
+    // What a method has is known with the method.
+    for (text, parts) in [
+        ("light = { up = [0, 0, 0] }", &["occlusion.light", "expected a direction"][..]),
+        (
+            "method = \"spao\"\nlight = \"sky\"",
+            &["occlusion.light", "method spao has uniform light only", "lao, cao, rays"],
+        ),
+    ] {
+        folder.put("scene.toml", format!("{volume}[occlusion]\n{text}"));
+        refused(&folder, "render scene.toml -o stereo.png", FAILURE, parts);
     }
     for (text, parts) in [
         (format!("{volume}transfer = \"bad.toml\""), &["bad.toml", "opacity[0]", "7"][..]),

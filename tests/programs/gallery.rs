@@ -52,7 +52,7 @@ fn the_gallery_shows_what_is_there_and_its_commands_make_it() {
     assert_eq!(shown(&page), there);
 }
 
-/// Each as it stands, but small, into a folder of its own, and of a built-in volume.
+/// Each as it stands, but small, into a folder of its own, and of a built-in volume; scenes are of one.
 #[test]
 fn the_commands_of_the_gallery_run() {
     let folder = Folder::with_device();
@@ -62,6 +62,11 @@ fn the_commands_of_the_gallery_run() {
         let mut small = words[1..].to_vec();
         let replaced = if small[1].starts_with("builtin:") {
             format!("{}:32", small[1].rsplit_once(':').unwrap().0)
+        } else if small[1].ends_with(".toml") {
+            let scene = fs::read_to_string(root().join(&small[1])).unwrap();
+            assert!(scene.contains(":128\""), "{words:?}");
+            folder.put("scene.toml", scene.replace(":128\"", ":32\""));
+            "scene.toml".to_owned()
         } else {
             assert!(small[1].starts_with("data/"), "{words:?}");
             "builtin:skeleton:32".to_owned()

@@ -97,6 +97,7 @@ fn setup() -> impl Strategy<Value = Setup> {
                 radius_mm: lengths.0,
                 offset_mm: lengths.1,
                 step_mm: lengths.2,
+                ..Occlusion::paper(1.0)
             },
             method,
             options: Options::DEFAULT,

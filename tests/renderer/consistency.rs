@@ -33,6 +33,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet, method: Method) -> Rendere
             radius_mm: 5.0 * volume.min_spacing() as f32,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         },
         method,
         options: Options::DEFAULT,

@@ -4,6 +4,7 @@ use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::Gpu;
 use cao_measure::random::Random;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::light::AmbientLight;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::options::Options;
@@ -29,6 +30,7 @@ const SETUP: Setup = Setup {
         radius_mm: 3.0,
         offset_mm: None,
         step_mm: None,
+        light: AmbientLight::Uniform,
     },
     method: Method::Cao,
     options: Options::DEFAULT,

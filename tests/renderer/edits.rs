@@ -4,13 +4,21 @@
 use crate::scenes::{NAMES, assert_as_fresh, scene};
 use cao_gpu::Gpu;
 use cao_measure::random::Random;
+use cao_model::light::AmbientLight;
 use cao_model::methods::Method;
 use cao_testing::*;
 
-/// The history of one scene; voxels compared and recomputed.
-fn history(gpu: &Gpu, name: &str, method: Method, seed: u64, steps: usize) -> (u64, u64) {
+/// The history of one scene in this light, which edits turn; voxels compared and recomputed.
+fn history(
+    gpu: &Gpu,
+    name: &str,
+    (method, light): (Method, AmbientLight),
+    seed: u64,
+    steps: usize,
+) -> (u64, u64) {
     let mut random = Random::new(seed);
     let mut scene = scene(&mut random, name, method);
+    scene.setup.occlusion.light = light;
     let mut renderer = scene.renderer(gpu);
     let (mut compared, mut recomputed) = (0, 0);
     let mut history = Vec::new();
@@ -50,7 +58,9 @@ fn updates_equal_a_full_computation_after_any_sequence_of_edits() {
     const STEPS: usize = 200;
     let gpu = open();
     for (case, name) in NAMES.into_iter().enumerate() {
-        let (compared, recomputed) = history(&gpu, name, Method::default(), SEED + case as u64, STEPS);
+        let light = [AmbientLight::Uniform, coloured_light(), AmbientLight::Uniform][case];
+        let (compared, recomputed) =
+            history(&gpu, name, (Method::default(), light), SEED + case as u64, STEPS);
         // Neither everything nor nothing was recomputed.
         assert!(
             compared > 100_000 && recomputed * 20 > compared && recomputed < compared,
@@ -66,7 +76,9 @@ fn so_do_those_of_every_other_method() {
     const STEPS: usize = 40;
     let gpu = open();
     for (case, method) in methods().filter(|method| *method != Method::default()).enumerate() {
-        let (compared, _) = history(&gpu, NAMES[case % NAMES.len()], method, 71 + case as u64, STEPS);
+        let light = if method == Method::Lao { AmbientLight::SKY } else { AmbientLight::Uniform };
+        let (compared, _) =
+            history(&gpu, NAMES[case % NAMES.len()], (method, light), 71 + case as u64, STEPS);
         assert!(compared > 20_000, "{}: {compared}", method.name());
     }
     close(gpu);

@@ -11,6 +11,7 @@ use cao_measure::exactness;
 use cao_measure::random::Random;
 use cao_model::builtin::{NAMES, builtin_box};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::light::AmbientLight;
 use cao_model::look::Look;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -29,7 +30,7 @@ const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, li
 
 fn setup(rays: RaySet, quadrature: Quadrature, radius_mm: f32, scope: Scope) -> Setup {
     Setup {
-        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
+        occlusion: Occlusion { rays, quadrature, radius_mm, ..Occlusion::paper(1.0) },
         method: Method::Cao,
         options: Options::DEFAULT,
         scope,
@@ -137,6 +138,7 @@ fn edit(random: &mut Random, renderer: &mut Renderer, volume: &Volume, shapes: &
                 1 => {
                     next.occlusion.rays = [RaySet::R6, RaySet::W14, RaySet::R26][pick(random, 3)];
                     next.occlusion.quadrature = Quadrature::CAST[pick(random, 3)];
+                    next.occlusion.light = next.occlusion.light.turned(third_turn());
                 }
                 2 => {
                     let between = |random: &mut Random, low, high| Some(random.between(low, high) * smallest);
@@ -198,8 +200,12 @@ fn contextual_equals_full_after_any_sequence_of_edits() {
         let name = ["engine", "fruit", "skeleton", "sheets"][case as usize];
         let volume = builtin_box(name, dims, spacing).unwrap();
         let radius = 3.0 * volume.min_spacing() as f32;
-        let mut renderer =
-            renderer(&gpu, &volume, setup(RaySet::R14, Quadrature::Left, radius, Scope::Needed));
+        let mut setup = setup(RaySet::R14, Quadrature::Left, radius, Scope::Needed);
+        // Light from above, which edits turn.
+        if case == 1 {
+            setup.occlusion.light = AmbientLight::SKY;
+        }
+        let mut renderer = renderer(&gpu, &volume, setup);
         let mut total = Difference::default();
         let mut history = Vec::new();
         for step in 0..STEPS {

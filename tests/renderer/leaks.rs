@@ -28,6 +28,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, method: Method) -> Renderer {
             radius_mm: 3.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         },
         method,
         options: Options::DEFAULT,

@@ -6,6 +6,7 @@ use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::Clip;
 use cao_model::feature::{Feature, Features};
+use cao_model::light::AmbientLight;
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, RaySet};
 use cao_model::options::Options;
@@ -23,7 +24,7 @@ const MAPS: MapSettings = MapSettings { resolution: 128, cells: 64, pairs: 4, li
 fn setup(method: Method, rays: RaySet, radius_mm: f32) -> Setup {
     let (rays, quadrature) = (method.rays_like(rays), method.quadrature());
     Setup {
-        occlusion: Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None },
+        occlusion: Occlusion { rays, quadrature, radius_mm, ..Occlusion::paper(1.0) },
         method,
         options: Options::DEFAULT,
         scope: Scope::Needed,
@@ -98,6 +99,14 @@ impl Scene {
                     let rule = ["own", "neighbours", "max", "sample"][pick(random, 4)];
                     next.options.set("combine", rule).unwrap();
                 }
+                if next.method.entry().options.contains(&"bleeding") && random.below(2) == 0 {
+                    next.options.set("bleeding", ["0", "0.7"][pick(random, 2)]).unwrap();
+                }
+                if next.method.entry().options.contains(&"levels") && random.below(2) == 0 {
+                    let form = ["nbuffer", "mip", "mixed:1", "reversed:2"][pick(random, 4)];
+                    next.options.set("levels", form).unwrap();
+                    next.options.set("normal", ["0", "1.3"][pick(random, 2)]).unwrap();
+                }
                 match random.below(5) {
                     0 => {
                         let radius = [0.0, random.between(0.0, 18.0), random.between(18.0, 60.0)];
@@ -108,6 +117,7 @@ impl Scene {
                         next.occlusion.rays = next.method.rays_like(sets[pick(random, 4)]);
                         let rules = next.method.entry().quadratures;
                         next.occlusion.quadrature = rules[pick(random, rules.len())];
+                        next.occlusion.light = next.occlusion.light.turned(third_turn());
                     }
                     2 => {
                         let share = random.between(0.0, 0.9) * smallest;
@@ -153,7 +163,12 @@ impl Scene {
                 let (rays, quadrature) = (method.rays_like(self.setup.occlusion.rays), method.quadrature());
                 let other = Setup {
                     method,
-                    occlusion: Occlusion { rays, quadrature, ..self.setup.occlusion },
+                    occlusion: Occlusion {
+                        rays,
+                        quadrature,
+                        light: AmbientLight::Uniform,
+                        ..self.setup.occlusion
+                    },
                     options: Options::DEFAULT,
                     ..self.setup
                 };

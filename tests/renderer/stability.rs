@@ -2,9 +2,9 @@
 //! sizes of the charts are the program's.
 
 use cao_measure::stability::{
-    Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
-    mip_blocks, motion, noise, numbers, pixels, radius, sheets, shells, stacked_layers, stereo, tables,
-    thin_sheets, views,
+    Effort, Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
+    mip_blocks, motion, noise, numbers, pixels, radius, shape, sheets, shells, stacked_layers, stereo,
+    tables, thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -296,6 +296,16 @@ fn an_opaque_sheet_is_nearly_nothing_to_a_histogram() {
     assert_shown(&finding);
     let histograms = curve(&finding, 0, "local histograms");
     assert!(histograms.at(12.0) < 0.5 * histograms.at(3.0), "{}", finding.sentence);
+}
+
+/// In balls, of all sizes and distances, forms that mix matter of all distances err most, and rays least.
+#[test]
+fn tone_mends_no_shape() {
+    let plan = shape::Plan { peaks: vec![1.0], ..shape::Plan::of(Effort::Quick) };
+    let finding = shape::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    let balls = ["rays", "16 shells", "box mean"].map(|name| curve(&finding, 2, name).at(1.0));
+    assert!(balls.is_sorted() && balls[1] > 2.0 * balls[0], "{balls:?}");
 }
 
 /// Computed in float64 outside of this program, to three digits.

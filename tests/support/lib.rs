@@ -15,6 +15,7 @@ use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Format, Gpu, Image, OpenOpt
 use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::light::AmbientLight;
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::{METHODS, Method};
 use cao_model::settings::Setup;
@@ -23,7 +24,7 @@ use cao_model::values::Values;
 use cao_model::view::{StereoRig, View};
 use cao_model::volume::Volume;
 use cao_twin::Grid;
-use glam::Vec3;
+use glam::{DMat3, DVec3, Vec3};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -223,6 +224,17 @@ pub fn row_of_boxes(count: u32) -> TriangleMesh {
 /// Every analytic shape, a convex and a concave mesh.
 pub fn shapes() -> Vec<Shape> {
     Shape::ANALYTIC.into_iter().chain([convex(), concave()].map(Shape::Mesh)).collect()
+}
+
+/// Ambient light of another colour from each side, some from everywhere.
+pub fn coloured_light() -> AmbientLight {
+    let sides = [[2.0; 3], [0.3, -0.2, 1.0], [1.0, 1.2, 0.4], [-0.8, 0.1, 0.6], [0.4, -0.5, 0.2]];
+    AmbientLight::harmonics(&sides).expect("five of nine")
+}
+
+/// A turn by a third about a diagonal, and a little more.
+pub fn third_turn() -> DMat3 {
+    DMat3::from_axis_angle(DVec3::ONE.normalize(), 2.2)
 }
 
 /// A clip around a volume of this size in mm: of any scale from a fiftieth of it to more than all of it.

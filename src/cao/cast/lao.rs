@@ -62,8 +62,8 @@ impl Lao {
     /// Writes the ray set; once after each change of the settings.
     pub fn record_rays(&self, rec: &mut Recorder, occlusion: &Occlusion) -> Result<()> {
         let mut data = kernel::Rays::zeroed();
-        for (slot, (unit, weight)) in data.ray.iter_mut().zip(occlusion.rays.unit_vectors()) {
-            *slot = unit.extend(weight).to_array();
+        for (slot, ([x, y, z], weight)) in data.ray.iter_mut().zip(occlusion.weighted_directions()) {
+            *slot = [x, y, z, weight].map(|c| c as f32);
         }
         rec.barrier(&[Access::UniformRead], &[Access::TransferWrite]);
         rec.update(&self.rays, 0, bytemuck::bytes_of(&data))?;
@@ -116,7 +116,7 @@ fn params(
         dims: field.dims,
         samples: occlusion.samples(smallest),
         bricks: field.bricks(),
-        rays: occlusion.rays.count() as u32,
+        rays: occlusion.weighted_directions().len() as u32,
         per_mm: field.spacing.map(f32::recip),
         first: occlusion.first(smallest),
         step,

@@ -24,8 +24,8 @@ const WIDEST: f64 = 0.25;
 pub struct ConePlan {
     /// As the kernel reads them.
     pub cones: Vec<kernel::Cone>,
-    /// How far in mm a change of opacity can change values: to the end, and the cells that are looked up there.
-    pub reach_mm: f32,
+    /// How far in voxels a change of opacity can change values: to the end along each axis, and the cells that are looked up there.
+    pub reach: [u32; 3],
     /// Where cones begin and end, in smallest spacings.
     start: f32,
     end: f32,
@@ -62,10 +62,10 @@ impl ConePlan {
         // Of a radius of 0 it is −∞, which is none.
         let levels = ((2.0 * end * widest).log2().ceil().max(0.0) as u32).min(MOST);
         let plan = Plan::of(dims, spacing, levels, Levels::Mip, 0.0);
-        let around = glam::Vec3::from_array(plan.reach()) * glam::Vec3::from_array(spacing);
-        let reach_mm = occlusion.radius_mm + around.length();
+        let farthest = |i: usize| cones.iter().map(|cone| end * cone.step[i].abs()).fold(0.0, f32::max);
+        let reach = plan.reach(std::array::from_fn(farthest));
         let start = occlusion.offset_mm.map_or(0.5, |offset| offset / smallest);
-        Ok((Self { cones, reach_mm, start, end }, plan))
+        Ok((Self { cones, reach, start, end }, plan))
     }
 }
 

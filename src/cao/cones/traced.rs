@@ -3,13 +3,14 @@
 use super::cone::{Bindings, ConePlan, ConeTracing};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// Mip levels, and cones through them.
@@ -50,8 +51,8 @@ impl Gather for Cones {
         plans(on, setup).map(drop)
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.plan.reach_mm
+    fn reach(&self) -> Reach {
+        Reach::Box(self.plan.reach)
     }
 
     /// The cones, and how levels are looked up.
@@ -62,14 +63,10 @@ impl Gather for Cones {
         }))
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        _: &'a Buffer,
-        _: Changed,
-    ) -> Vec<Part<'a>> {
-        self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
+        let (exponent, change) =
+            (on.field.min_spacing() / on.ambient_mm, (!changed.anew).then_some(from.change));
+        self.make.parts(exponent, &self.levels, from.opacity, change)
     }
 
     fn stage(&self) -> (Stage, u32) {

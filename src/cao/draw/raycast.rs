@@ -33,6 +33,8 @@ pub struct Bindings<'a> {
     pub features: &'a FeatureSet,
     /// V_AO.
     pub ambient: &'a Image,
+    /// Whether it is of coloured light.
+    pub coloured: bool,
     /// How far rays may leap.
     pub distances: &'a Buffer,
     /// Beyond which nothing is to be seen.
@@ -55,6 +57,8 @@ pub struct Raycast {
     gpu: Gpu,
     plain: Pipelines,
     featured: Pipelines,
+    coloured: Pipelines,
+    featured_coloured: Pipelines,
     /// Of 8-bit texels.
     coarse: bool,
     edge: Sampler,
@@ -90,6 +94,8 @@ impl Raycast {
             gpu: gpu.clone(),
             plain: Pipelines::default(),
             featured: Pipelines::default(),
+            coloured: Pipelines::default(),
+            featured_coloured: Pipelines::default(),
             coarse,
             edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
         };
@@ -129,30 +135,26 @@ impl Raycast {
             first_tile: tiles.start,
             tiles: tiles.len() as u32,
             ended: u32::from(ended),
-            channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm),
+            channels: u32::from(b.ambient.desc().format == Format::Rgba16Unorm && !b.coloured),
             pad: Default::default(),
         };
         let [x, y, _] = row_of_groups(tiles.len() as u32);
         let groups = [x, y, picture.views() as u32];
         let push = bytemuck::bytes_of(&params);
-        let of = if featured { &self.featured } else { &self.plain };
-        match (featured, picture.colour.desc().format == HALF_COLOUR) {
-            (false, false) => {
-                let binds = bindings!(MainBindings, b, edge, picture, colours);
-                rec.dispatch(self.built(&of.floats, "main")?, &binds, push, groups)?;
-            }
-            (false, true) => {
-                let binds = bindings!(HalfFloatsBindings, b, edge, picture, half_colours);
-                rec.dispatch(self.built(&of.halves, "half_floats")?, &binds, push, groups)?;
-            }
-            (true, false) => {
-                let binds = bindings!(FeaturedBindings, b, edge, picture, colours);
-                rec.dispatch(self.built(&of.floats, "featured")?, &binds, push, groups)?;
-            }
-            (true, true) => {
-                let binds = bindings!(FeaturedHalfFloatsBindings, b, edge, picture, half_colours);
-                rec.dispatch(self.built(&of.halves, "featured_half_floats")?, &binds, push, groups)?;
-            }
+        let halves = picture.colour.desc().format == HALF_COLOUR;
+        let (of, [floats, half_floats]) = match (featured, b.coloured) {
+            (false, false) => (&self.plain, ["main", "half_floats"]),
+            (true, false) => (&self.featured, ["featured", "featured_half_floats"]),
+            (false, true) => (&self.coloured, ["coloured", "coloured_half_floats"]),
+            (true, true) => (&self.featured_coloured, ["featured_coloured", "featured_coloured_half_floats"]),
+        };
+        // What entry points bind is the same but for the image of colours.
+        if halves {
+            let binds = bindings!(HalfFloatsBindings, b, edge, picture, half_colours);
+            rec.dispatch(self.built(&of.halves, half_floats)?, &binds, push, groups)?;
+        } else {
+            let binds = bindings!(MainBindings, b, edge, picture, colours);
+            rec.dispatch(self.built(&of.floats, floats)?, &binds, push, groups)?;
         }
         Ok(())
     }

@@ -9,12 +9,13 @@ use super::labels::Labels;
 use super::mask::{Mask, Masked};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::rays::rays::RayPlan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Format, Image, Recorder, Stage};
+use cao_gpu::{Buffer, Format, Recorder, Stage};
 use cao_model::options::Combine;
 use cao_model::settings::Setup;
 
@@ -66,10 +67,10 @@ impl Gather for Driven {
         Ok(())
     }
 
-    fn reach_mm(&self) -> f32 {
+    fn reach(&self) -> Reach {
         // Values of neighbours are a diagonal away; a hundredth is for rounding.
         let beside = if self.combine == Combine::Neighbours { 1.01 * self.diagonal } else { 0.0 };
-        self.plan.reach_mm + beside
+        Reach::Ball(self.plan.reach_mm + beside)
     }
 
     /// The table of rays.
@@ -85,19 +86,21 @@ impl Gather for Driven {
         })
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        change: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
         if self.masked.images.is_empty() {
             return Vec::new();
         }
         vec![Part::short(stages::MASK, move |rec| {
             let labels = &self.labels.image;
-            Ok(self.mask.record(rec, &on.field, changed.anew, opacity, labels, change, &self.masked)?)
+            Ok(self.mask.record(
+                rec,
+                &on.field,
+                changed.anew,
+                from.opacity,
+                labels,
+                from.change,
+                &self.masked,
+            )?)
         })]
     }
 

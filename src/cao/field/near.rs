@@ -1,12 +1,16 @@
-//! Which bricks an edit concerns (method.md §5.2): `todo(b) ⇔ (needed(b) ∨ valued(b)) ∧ min_{b' changed} d(b, b') ≤ reach`, with d the
-//! distance in mm of the nearest voxels of two bricks, by a separable Euclidean distance transform; *valued* are bricks that needed values
-//! so far, which hold 1 again where they no longer do.
+//! Which bricks an edit concerns (method.md §5.2): `todo(b) ⇔ (needed(b) ∨ valued(b)) ∧ ∃ b' changed: near(b, b')`, by a separable distance
+//! transform; *valued* are bricks that needed values so far, which hold 1 again where they no longer do. Between the nearest voxels of
+//! bricks n > 0 apart along an axis lie `g = 8 (n − 1) + 1` voxels, 0 in the same row. By [`Reach`]:
+//!
+//! ```text
+//! ball    |(g_x, g_y, g_z) · spacing| ≤ reach in mm           box    g_i ≤ reach_i in voxels, each axis for itself
+//! ```
 //!
 //! In and out: `change` (f32 a brick: squared distance, 0 where changed, [`FAR`] elsewhere; holds [`FAR`] again afterwards).
 //! In: `contact` of [`crate::clip::carve`]. In and out: `todo` (a u32 a brick: [`TODO`], [`VALUED`]). Out: their `list`. Cost: a few reads a brick and axis.
 
-use crate::field::Field;
 use crate::field::bricks::BrickList;
+use crate::field::{BRICK, Field};
 use crate::host::rows_over;
 use cao_gpu::Result;
 use cao_gpu::{Access, Buffer, Gpu, Pipeline, Recorder};
@@ -15,6 +19,28 @@ use cao_model::settings::Scope;
 
 pub use cao_kernels::shared::todo::{TODO, VALUED};
 pub use kernel::FAR;
+
+/// How far a change of opacity can change values: to where, seen from the changed voxel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reach {
+    /// So many mm in every direction: of methods that follow rays.
+    Ball(f32),
+    /// So many voxels along each axis from a changed brick: of methods that read boxes. The ball around a cube has 2.7 times its volume.
+    Box([u32; 3]),
+}
+
+impl Reach {
+    /// Bricks on each side that it can touch, of as many as there are.
+    fn bricks(self, field: &Field) -> [u32; 3] {
+        let touched = |i: usize| match self {
+            // One for rounding; the kernel measures.
+            Self::Ball(mm) => (mm / (BRICK as f32 * field.spacing[i])) as u32 + 2,
+            Self::Box(voxels) => voxels[i].div_ceil(BRICK),
+        };
+        let count = field.bricks();
+        std::array::from_fn(|i| touched(i).min(count[i]))
+    }
+}
 
 /// What the kernel reads and writes.
 #[derive(Clone, Copy)]
@@ -50,7 +76,7 @@ impl Near {
         rec: &mut Recorder,
         field: &Field,
         scope: Scope,
-        reach_mm: f32,
+        reach: Reach,
         b: Bindings,
     ) -> Result<()> {
         const { assert!(kernel::SPREAD_WORKGROUP[0] == kernel::CHOOSE_WORKGROUP[0]) };
@@ -58,10 +84,10 @@ impl Near {
         let mut params = kernel::NearParams {
             bricks: field.bricks(),
             axis: 0,
-            spacing: field.spacing,
-            reach: reach_mm,
+            spacing: if let Reach::Ball(_) = reach { field.spacing } else { [0.0; 3] },
+            reach: if let Reach::Ball(mm) = reach { mm } else { 0.0 },
+            most: reach.bricks(field),
             unneeded: u32::from(scope == Scope::All),
-            pad: Default::default(),
         };
         let between = [Access::StorageRead, Access::StorageWrite];
         let (mut before, mut after) = (b.change, b.other);

@@ -9,11 +9,12 @@ use super::expand::{Bindings, Expand, Scene};
 use super::histogram::{Histogram, HistogramPlan, MOST_FINE};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Format, Recorder, Stage};
 use cao_model::settings::Setup;
 use std::sync::{Mutex, PoisonError};
 
@@ -23,8 +24,6 @@ pub struct Clustered {
     clusters: Clusters,
     expand: Expand,
     plan: HistogramPlan,
-    /// Of a voxel, mm.
-    diagonal: f32,
     /// What the clusters are of once all that was recorded has run: which values, and which histograms of them; `None` before the first.
     held: Mutex<Option<(u64, HistogramPlan)>>,
 }
@@ -41,7 +40,8 @@ fn plan(on: &Subject, setup: &Setup) -> HistogramPlan {
 
 impl Clustered {
     fn scene<'a>(&'a self, on: &'a Subject) -> Scene<'a> {
-        Scene { plan: &self.plan, reference_mm: on.ambient_mm, scope: on.setup.scope }
+        let bleeding = on.setup.options.bleeding;
+        Scene { plan: &self.plan, reference_mm: on.ambient_mm, scope: on.setup.scope, bleeding }
     }
 
     /// Whether the clusters are of something else.
@@ -56,13 +56,16 @@ impl Gather for Clustered {
     const NAME: &str = "histograms";
     const OF_VALUES: bool = true;
 
+    fn format(on: &Subject) -> Format {
+        if on.coloured() { Format::Rgba16Unorm } else { Format::R16Unorm }
+    }
+
     fn new(on: &Subject) -> Result<Self> {
         Ok(Self {
             histogram: Histogram::new(&on.gpu, &on.field, block(on))?,
             clusters: Clusters::new(&on.gpu)?,
-            expand: Expand::new(&on.gpu)?,
+            expand: Expand::new(&on.gpu, on.coloured())?,
             plan: plan(on, &on.setup),
-            diagonal: on.field.diagonal(),
             held: Mutex::new(None),
         })
     }
@@ -77,17 +80,11 @@ impl Gather for Clustered {
     }
 
     /// Opacities say only which voxels need a value: those beside them.
-    fn reach_mm(&self) -> f32 {
-        1.01 * self.diagonal
+    fn reach(&self) -> Reach {
+        Reach::Box([1; 3])
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        _: &'a Image,
-        _: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, _: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
         let (histogram, clusters, field) = (&self.histogram, &self.clusters, &on.field);
         let sampled = &histogram.sampled;
         let mut parts = vec![Part::long(stages::HISTOGRAMS, move |rec| {

@@ -1,8 +1,9 @@
 //! From clusters to values (docs/histograms.md): `A_c = 1 − Σ_j α_j LH_cj` for every cluster c, α_j the transfer function's opacity of bin j
-//! in a smallest spacing; then every voxel of the listed bricks that needs a value takes its cluster's.
+//! in a smallest spacing; then every voxel of the listed bricks that needs a value takes its cluster's. Where matter lends its colour, A_c is
+//! red, green and blue: `1 − Σ_j α_j (1 − b rgb_j) LH_cj`.
 //!
 //! In: the clusters, the range of values, the transfer function; `opacity` V_o, for which voxels need a value; the index volume, the list.
-//! Out: `ambient` V_AO (3D r16unorm) in the listed bricks, one write a voxel. Cost: two reads a voxel.
+//! Out: `ambient` V_AO (3D r16unorm; of colours rgba16unorm) in the listed bricks, one write a voxel. Cost: two reads a voxel.
 
 use super::histogram::HistogramPlan;
 use crate::drive::Take;
@@ -23,6 +24,8 @@ pub struct Scene<'a> {
     pub reference_mm: f32,
     /// Which voxels get a value.
     pub scope: Scope,
+    /// b.
+    pub bleeding: f32,
 }
 
 /// What the kernel reads and writes.
@@ -42,21 +45,25 @@ pub struct Bindings<'a> {
 pub struct Expand {
     shade: Pipeline,
     main: Pipeline,
+    /// Of each cluster one number, or four.
     factors: Buffer,
+    coloured: bool,
 }
 
 impl Expand {
-    /// Builds the pipelines.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
+    /// Builds the pipelines, for values of one number or of three.
+    pub fn new(gpu: &Gpu, coloured: bool) -> Result<Self> {
         let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
+        let ([shade, main], bytes) = match coloured {
+            false => (["shade", "main"], size_of::<f32>()),
+            true => (["shade_coloured", "main_coloured"], size_of::<[f32; 4]>()),
+        };
+        let room = bytes as u64 * u64::from(Options::MOST_CLUSTERS);
         Ok(Self {
-            shade: pipeline("shade")?,
-            main: pipeline("main")?,
-            factors: gpu.buffer(
-                "factors of clusters",
-                4 * u64::from(Options::MOST_CLUSTERS),
-                BufferUse::Device,
-            )?,
+            shade: pipeline(shade)?,
+            main: pipeline(main)?,
+            factors: gpu.buffer("factors of clusters", room, BufferUse::Device)?,
+            coloured,
         })
     }
 
@@ -69,13 +76,20 @@ impl Expand {
         [range_of, centres, transfer]: [&Buffer; 3],
     ) -> Result<()> {
         let params = params(field, scene, 0);
-        let binds = kernel::ShadeBindings { transfer, centres, range_of, factors: &self.factors };
+        let factors = &self.factors;
         rec.barrier(
             &[Access::StorageRead, Access::StorageWrite],
             &[Access::StorageRead, Access::StorageWrite],
         );
         let groups = [scene.plan.clusters.div_ceil(kernel::EACH), 1, 1];
-        rec.dispatch(&self.shade, &binds, bytemuck::bytes_of(&params), groups)?;
+        let push = bytemuck::bytes_of(&params);
+        if self.coloured {
+            let binds = kernel::ShadeColouredBindings { transfer, centres, range_of, tints: factors };
+            rec.dispatch(&self.shade, &binds, push, groups)?;
+        } else {
+            let binds = kernel::ShadeBindings { transfer, centres, range_of, factors };
+            rec.dispatch(&self.shade, &binds, push, groups)?;
+        }
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
         Ok(())
     }
@@ -90,14 +104,15 @@ impl Expand {
         take: &Take,
     ) -> Result<()> {
         let params = params(field, scene, take.first());
-        let binds = kernel::MainBindings {
-            opacity: b.opacity,
-            factors: &self.factors,
-            list: &b.list.buffer,
-            index: b.index,
-            ambient: b.ambient,
-        };
-        take.dispatch(rec, &self.main, &binds, bytemuck::bytes_of(&params), &b.list.buffer)
+        let (factors, list, push) = (&self.factors, &b.list.buffer, bytemuck::bytes_of(&params));
+        let Bindings { opacity, index, ambient, .. } = b;
+        if self.coloured {
+            let binds =
+                kernel::MainColouredBindings { opacity, tints: factors, list, index, coloured: ambient };
+            return take.dispatch(rec, &self.main, &binds, push, list);
+        }
+        let binds = kernel::MainBindings { opacity, factors, list, index, ambient };
+        take.dispatch(rec, &self.main, &binds, push, list)
     }
 }
 
@@ -110,6 +125,6 @@ fn params(field: &Field, scene: Scene, base: u32) -> kernel::ExpandParams {
         clusters: scene.plan.clusters,
         unneeded: u32::from(scene.scope == Scope::All),
         exponent: field.min_spacing() / scene.reference_mm,
-        pad: Default::default(),
+        bleeding: scene.bleeding,
     }
 }

@@ -3,3 +3,4 @@
 pub mod level;
 pub mod levels;
 pub mod plan;
+pub mod tiles;

@@ -14,11 +14,15 @@
 //! from the corner: between N-buffer cells that is the centred cube with half of its weight in its outermost layers, exactly. Without that half
 //! voxel shading shifts by half a voxel along each axis.
 
+use crate::field::BRICK;
 use cao_kernels::shared::levels::{LEVELS, Level};
 use cao_model::options::Levels;
 
 /// Most levels behind V_o.
 pub const MOST: u32 = LEVELS - 1;
+
+/// What texture coordinates are rounded by, in cells: devices have 8 bits at least of what lies between two of them.
+const ROUNDED: f32 = 1.0 / 128.0;
 
 /// Longest radius in smallest spacings: half the width of the last level's cube.
 pub const MOST_VOXELS: f32 = (1 << (MOST - 1)) as f32;
@@ -34,6 +38,18 @@ pub struct Cells {
     pub first: [i64; 3],
     /// How many are.
     pub dims: [u32; 3],
+}
+
+impl Cells {
+    /// Tiles along each axis: as many cells as a brick has voxels.
+    pub fn tiles(&self) -> [u32; 3] {
+        self.dims.map(|n| n.div_ceil(BRICK))
+    }
+
+    /// Tiles in all.
+    pub fn tile_count(&self) -> u32 {
+        self.tiles().iter().product()
+    }
 }
 
 /// All levels, the first that of V_o itself.
@@ -97,13 +113,19 @@ impl Plan {
         self.cells.len() as u32 - 1
     }
 
-    /// How far in voxels along each axis a change of opacity can change what is looked up: half a cube, moved out, between cells. That is
-    /// 2^(L−1)(1 + factor) + 2 of N-buffers and 2^L(factor/2 + 3/2) + 1 of mip levels; a voxel is for rounding, and for the normal.
-    pub fn reach(&self) -> [f32; 3] {
+    /// How many voxels along each axis from a changed brick it can change what is looked up around a voxel, or around a place as far from its
+    /// middle as `moved` says.
+    ///
+    /// A look-up at x takes the cells of which the middle is less than t from it. The last of those that have voxels of a brick ends w − min(t, 8)
+    /// beyond it, for cells and bricks begin at common multiples; and the middle of a voxel is half a voxel from its side. So `|x| < w/2 + t − min(t, 8) + ½`
+    /// beyond the brick: `2^(L−1) (1 + factor)` of N-buffers, `2^(L−1) (3 + factor) − 8` of mip levels as wide as bricks. Level 0 covers neighbours,
+    /// for the normal and for which voxels need a value.
+    pub fn reach(&self, moved: [f32; 3]) -> [u32; 3] {
         let far = |cells: &Cells, i: usize| {
-            0.5 * (1.0 + self.factor) * cells.width[i] as f32 + cells.stride[i] as f32 + 1.0
+            let (w, t) = (cells.width[i] as f32, cells.stride[i] as f32);
+            moved[i] + 0.5 * (1.0 + self.factor) * w + t * (1.0 + ROUNDED) - t.min(BRICK as f32) + 0.5
         };
-        std::array::from_fn(|i| self.cells.iter().map(|cells| far(cells, i)).fold(0.0, f32::max))
+        std::array::from_fn(|i| self.cells.iter().map(|cells| far(cells, i) as u32).max().unwrap_or(1))
     }
 
     /// As kernels look them up.
@@ -212,13 +234,15 @@ mod tests {
 
     #[test]
     fn the_reach_is_that_of_the_last_cube() {
-        let reach = |levels, factor| Plan::of([16; 3], [1.0; 3], 4, levels, factor).reach()[0];
-        assert_eq!(reach(Levels::Nbuffer, 0.0), 8.0 + 2.0);
-        assert_eq!(reach(Levels::Nbuffer, 2.0), 8.0 * 3.0 + 2.0);
-        assert_eq!(reach(Levels::Mip, 0.0), 16.0 * 1.5 + 1.0);
-        assert_eq!(reach(Levels::Mip, 1.0), 16.0 * 2.0 + 1.0);
-        assert_eq!(reach(Levels::Mixed(1), 0.0), 8.0 + 3.0);
-        assert_eq!(reach(Levels::Reversed(3), 0.0), 8.0 + 3.0);
+        let reach = |levels, factor| Plan::of([16; 3], [1.0; 3], 4, levels, factor).reach([0.0; 3])[0];
+        assert_eq!(reach(Levels::Nbuffer, 0.0), 8);
+        assert_eq!(reach(Levels::Nbuffer, 2.0), 8 * 3);
+        assert_eq!(reach(Levels::Mip, 0.0), 8 * 3 - 8);
+        assert_eq!(reach(Levels::Mip, 1.0), 8 * 4 - 8);
+        assert_eq!(reach(Levels::Mixed(1), 0.0), 8);
+        assert_eq!(reach(Levels::Reversed(3), 0.0), 8);
+        let none = Plan::of([16; 3], [1.0; 3], 0, Levels::Mip, 0.0);
+        assert_eq!((none.reach([0.0; 3]), none.reach([5.5, 1.0, 0.0])), ([1; 3], [6, 2, 1]));
     }
 
     /// At 512³ the border costs 7 %: 2 bytes a voxel and level of N-buffers, 2/7 in all of mip levels.

@@ -1,8 +1,8 @@
 //! Rays by brick (method.md §4; `cao_twin::rays::rays` has the equations): every voxel of the listed bricks that needs a value, along every
 //! direction of a plan.
 //!
-//! In: `opacity` V_o (3D r16unorm, the only form of it), the list of bricks. Out: `ambient` V_AO (3D r16unorm) in the listed bricks, one
-//! write a voxel. Cost: N·M reads of V_o a voxel at most; a ray ends when it is dark or leaves the volume. Forms that were timed on a
+//! In: `opacity` V_o (3D r16unorm, the only form of it), the list of bricks. Out: `ambient` V_AO (3D r16unorm; of coloured light rgba16unorm:
+//! red, green, blue, 1) in the listed bricks, one write a voxel. Cost: N·M reads of V_o a voxel at most; a ray ends when it is dark or leaves the volume. Forms that were timed on a
 //! GPU: `benches/runs/2026-11-26-h200-rays-prototype/`.
 
 use super::ruled::Ruled;
@@ -10,9 +10,10 @@ use crate::drive::Take;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use cao_gpu::Result;
-use cao_gpu::{Gpu, Image, Recorder};
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image, Recorder};
 use cao_kernels::rays as kernel;
-use cao_model::occlusion::{Occlusion, Quadrature};
+use cao_model::light::Lights;
+use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::settings::Scope;
 
 /// Longest ray, offset included, in smallest spacings: what was tested.
@@ -22,8 +23,10 @@ pub const MOST_VOXELS: f32 = 256.0;
 /// their voxel, as they do unless an offset is given; they end in the middle of the last.
 #[derive(Clone, Debug)]
 pub struct RayPlan {
-    /// As the kernel reads them, in any order.
+    /// As the kernel reads them, in any order. Those from which no light comes are left out.
     pub directions: Vec<kernel::Direction>,
+    /// Of coloured light, of each of them: its factors in red, green and blue; else none.
+    pub tints: Vec<[f32; 4]>,
     /// How far in mm a change of opacity can change values: rays and what they interpolate.
     pub reach_mm: f32,
     pub(crate) rule: Quadrature,
@@ -60,17 +63,20 @@ impl RayPlan {
         };
         let unit = f64::from(kernel::UNIT);
         let halves = f64::from((2 * cells).saturating_sub(1).max(1));
-        let directions: Vec<_> = occlusion
-            .rays
-            .directions()
-            .into_iter()
-            .map(|(d, weight)| kernel::Direction {
+        let factor = |weight: f64| (weight * f64::from(kernel::FINE) / halves) as f32;
+        let lit = occlusion.lit_directions();
+        let directions: Vec<_> = lit
+            .iter()
+            .map(|&(d, weights)| kernel::Direction {
                 step: step(d).map(|c| (unit * c).round() as i32),
-                factor: (weight * f64::from(kernel::FINE) / halves) as f32,
+                factor: factor(weights[0]),
                 half_step: step(d).map(|c| (0.5 * c) as f32),
                 pad: Default::default(),
             })
             .collect();
+        let coloured = occlusion.light.needs() == Lights::Coloured;
+        let tint = |[r, g, b]: [f64; 3]| [factor(r), factor(g), factor(b), 0.0];
+        let tints = lit.iter().filter(|_| coloured).map(|(_, weights)| tint(*weights)).collect();
         let shift = occlusion.offset_mm.map_or(0.0, |offset| offset / step_mm - 0.5);
         let farthest = |i: usize| {
             let cell = |d: &kernel::Direction| {
@@ -90,6 +96,7 @@ impl RayPlan {
                 rule => rule,
             },
             directions,
+            tints,
             cells,
             step_mm,
             shift,
@@ -114,24 +121,40 @@ pub struct Bindings<'a> {
     pub opacity: &'a Image,
     /// Bricks to work on.
     pub list: &'a BrickList,
-    /// V_AO.
+    /// V_AO, of coloured light rgba16unorm.
     pub ambient: &'a Image,
 }
 
 /// The kernel `rays`, one pipeline a rule.
 pub struct Rays {
     ruled: Ruled,
+    /// Of coloured light: those of the plan that was written last.
+    tints: Option<Buffer>,
 }
 
 impl Rays {
-    /// Builds the pipelines. Uses the device's queue and waits for it.
+    /// Builds the pipelines for light of one colour. Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { ruled: Ruled::new(gpu, &kernel::SHADER)? })
+        Ok(Self { ruled: Ruled::new(gpu, &kernel::SHADER)?, tints: None })
+    }
+
+    /// Those for coloured light. Uses the device's queue and waits for it.
+    pub fn coloured(gpu: &Gpu) -> Result<Self> {
+        let entries = ["nearest_coloured", "hybrid_coloured", "linear_coloured"];
+        let room = size_of::<[f32; 4]>() as u64 * u64::from(RaySet::MOST);
+        let tints = gpu.buffer("tints", room, BufferUse::Device)?;
+        Ok(Self { ruled: Ruled::of(gpu, &kernel::SHADER, entries)?, tints: Some(tints) })
     }
 
     /// Writes the directions of a plan; once after each change of the settings.
     pub fn record_directions(&self, rec: &mut Recorder, plan: &RayPlan) -> Result<()> {
-        self.ruled.record_directions(rec, plan)
+        self.ruled.record_directions(rec, plan)?;
+        if let Some(tints) = &self.tints {
+            rec.barrier(&[Access::StorageRead], &[Access::TransferWrite]);
+            rec.update(tints, 0, bytemuck::cast_slice(&plan.tints))?;
+            rec.barrier(&[Access::TransferWrite], &[Access::StorageRead]);
+        }
+        Ok(())
     }
 
     /// Works on the list, or some of its bricks, along the directions written last. `opacity` is per `reference_mm`.
@@ -147,8 +170,11 @@ impl Rays {
         take: &Take,
     ) -> Result<()> {
         let params = params(field, plan, reference_mm, scope, take.first());
-        let (binds, push) = (self.binds(b), bytemuck::bytes_of(&params));
-        take.dispatch(rec, self.ruled.pipeline(plan), &binds, push, &b.list.buffer)
+        let (pipeline, push) = (self.ruled.pipeline(plan), bytemuck::bytes_of(&params));
+        match &self.tints {
+            None => take.dispatch(rec, pipeline, &self.binds(b), push, &b.list.buffer),
+            Some(tints) => take.dispatch(rec, pipeline, &self.coloured_binds(b, tints), push, &b.list.buffer),
+        }
     }
 
     fn binds<'a>(&'a self, b: Bindings<'a>) -> kernel::HybridBindings<'a> {
@@ -159,6 +185,22 @@ impl Rays {
             cells: &self.ruled.cells,
             list: &b.list.buffer,
             ambient: b.ambient,
+        }
+    }
+
+    fn coloured_binds<'a>(
+        &'a self,
+        b: Bindings<'a>,
+        tints: &'a Buffer,
+    ) -> kernel::HybridColouredBindings<'a> {
+        kernel::HybridColouredBindings {
+            opacity: b.opacity,
+            field: &self.ruled.field,
+            directions: &self.ruled.directions,
+            cells: &self.ruled.cells,
+            list: &b.list.buffer,
+            tints,
+            coloured: b.ambient,
         }
     }
 }
@@ -181,7 +223,6 @@ fn params(field: &Field, plan: &RayPlan, reference_mm: f32, scope: Scope, base: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cao_model::occlusion::RaySet;
 
     #[test]
     fn rays_are_as_long_as_they_are_asked_for_and_no_longer_than_256_voxels() {

@@ -25,12 +25,21 @@ pub(crate) struct Ruled {
 impl Ruled {
     /// Builds the pipelines of the entry points `nearest`, `hybrid` and `linear`. Uses the device's queue and waits for it.
     pub(crate) fn new(gpu: &Gpu, shader: &'static Shader) -> Result<Self> {
+        Self::of(gpu, shader, ["nearest", "hybrid", "linear"])
+    }
+
+    /// Builds the pipelines of these entry points, one for each of the three rules. Uses the device's queue and waits for it.
+    pub(crate) fn of(
+        gpu: &Gpu,
+        shader: &'static Shader,
+        [nearest, hybrid, linear]: [&str; 3],
+    ) -> Result<Self> {
         let pipeline = |entry| gpu.compute(shader, entry);
         let room = size_of::<kernel::Direction>() as u64 * u64::from(RaySet::MOST);
         Ok(Self {
-            nearest: pipeline("nearest")?,
-            hybrid: pipeline("hybrid")?,
-            linear: pipeline("linear")?,
+            nearest: pipeline(nearest)?,
+            hybrid: pipeline(hybrid)?,
+            linear: pipeline(linear)?,
             field: gpu.sampler("field", SamplerDesc { linear: true, border_zero: true })?,
             directions: gpu.buffer("directions", room, BufferUse::Device)?,
             cells: device_buffer(gpu, "cell means", bytemuck::bytes_of(&cell_means()))?,

@@ -4,9 +4,10 @@ use super::rays::{Bindings, RayPlan, Rays};
 use crate::Result;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Recorder, Stage};
+use cao_gpu::{Format, Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// Rays of the listed bricks.
@@ -18,9 +19,14 @@ pub struct Traced {
 impl Gather for Traced {
     const NAME: &str = "rays";
 
+    fn format(on: &Subject) -> Format {
+        if on.coloured() { Format::Rgba16Unorm } else { Format::R16Unorm }
+    }
+
     fn new(on: &Subject) -> Result<Self> {
         let plan = RayPlan::new(on.field.spacing, &on.setup.occlusion)?;
-        Ok(Self { rays: Rays::new(&on.gpu)?, plan })
+        let rays = if on.coloured() { Rays::coloured(&on.gpu)? } else { Rays::new(&on.gpu)? };
+        Ok(Self { rays, plan })
     }
 
     fn set(&mut self, on: &Subject) -> Result<()> {
@@ -33,8 +39,8 @@ impl Gather for Traced {
         Ok(())
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.plan.reach_mm
+    fn reach(&self) -> Reach {
+        Reach::Ball(self.plan.reach_mm)
     }
 
     /// The table of rays.

@@ -108,6 +108,7 @@ impl Renderer {
             values: &subject.field.volume,
             features: &subject.features,
             ambient: fields.ambient,
+            coloured: subject.coloured(),
             distances: &self.distances,
             bounds: &self.bounds,
             clips: &subject.clip_set,

@@ -3,13 +3,14 @@
 use super::product::{Bindings, Product};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// The volumes of means, and their product.
@@ -18,19 +19,13 @@ pub struct Shells {
     product: Product,
     levels: LevelImages,
     lifted: bool,
-    reach_mm: f32,
+    reach: Reach,
 }
 
 fn plan(on: &Subject, setup: &Setup) -> Result<Plan> {
     let (field, options) = (&on.field, &setup.options);
     let radius_mm = setup.occlusion.radius_mm;
     Ok(Plan::new(field.dims, field.spacing, radius_mm, options.levels, options.normal)?)
-}
-
-/// From the corner of the box that a value depends on, in mm.
-fn reach_mm(on: &Subject, plan: &Plan) -> f32 {
-    let reach = plan.reach();
-    glam::Vec3::from_array(std::array::from_fn(|i| reach[i] * on.field.spacing[i])).length()
 }
 
 impl Gather for Shells {
@@ -41,7 +36,7 @@ impl Gather for Shells {
         Ok(Self {
             make: MakeLevels::new(&on.gpu)?,
             product: Product::new(&on.gpu)?,
-            reach_mm: reach_mm(on, &plan),
+            reach: Reach::Box(plan.reach([0.0; 3])),
             levels: LevelImages::new(&on.gpu, plan)?,
             lifted: on.setup.options.normal > 0.0,
         })
@@ -49,11 +44,11 @@ impl Gather for Shells {
 
     fn set(&mut self, on: &Subject) -> Result<()> {
         let plan = plan(on, &on.setup)?;
-        let reach_mm = reach_mm(on, &plan);
+        self.reach = Reach::Box(plan.reach([0.0; 3]));
         if plan != self.levels.plan {
             self.levels = LevelImages::new(&on.gpu, plan)?;
         }
-        (self.lifted, self.reach_mm) = (on.setup.options.normal > 0.0, reach_mm);
+        self.lifted = on.setup.options.normal > 0.0;
         Ok(())
     }
 
@@ -61,8 +56,8 @@ impl Gather for Shells {
         plan(on, setup).map(drop)
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.reach_mm
+    fn reach(&self) -> Reach {
+        self.reach
     }
 
     /// How levels are looked up.
@@ -70,14 +65,10 @@ impl Gather for Shells {
         Some(Part::short(stages::TABLE, |rec| Ok(self.make.record_table(rec, &self.levels.plan)?)))
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        _: &'a Buffer,
-        _: Changed,
-    ) -> Vec<Part<'a>> {
-        self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
+        let (exponent, change) =
+            (on.field.min_spacing() / on.ambient_mm, (!changed.anew).then_some(from.change));
+        self.make.parts(exponent, &self.levels, from.opacity, change)
     }
 
     fn stage(&self) -> (Stage, u32) {

@@ -25,8 +25,8 @@ pub struct BoxPlan {
     pub shells: Vec<kernel::Shell>,
     /// What the table has to add up.
     pub counted: Counted,
-    /// How far in mm a change of opacity can change values: to the corners of the largest box, or to the neighbours that need one.
-    pub reach_mm: f32,
+    /// How far in voxels a change of opacity can change values: to the sides of the largest box, or to the neighbours that need one.
+    pub reach: [u32; 3],
     rule: Quadrature,
     smallest_mm: f32,
 }
@@ -75,10 +75,9 @@ impl BoxPlan {
             });
             (inside, before) = (here, edge_of);
         }
-        let corner = glam::UVec3::from_array(half(edge)).as_vec3() * glam::Vec3::from_array(spacing);
-        // Rounded up; what needs a value depends on a neighbour along the diagonal.
-        let reach_mm = 1.01 * corner.length().max(glam::Vec3::from_array(spacing).length());
-        Ok(Self { shells: boxes, counted, reach_mm, rule, smallest_mm })
+        // What needs a value depends on a neighbour.
+        let reach = half(edge).map(|voxels| voxels.max(1));
+        Ok(Self { shells: boxes, counted, reach, rule, smallest_mm })
     }
 
     /// Reads of the table for a brick.

@@ -1,7 +1,7 @@
 //! Stereo consistency (CAO §5, method.md §7): what each eye reads at given points of the volume.
 //!
 //! In: world points, both eyes, V_o, V_AO. Out: for every point and eye the transmittance in front of it (−1 outside the
-//! image) and the ambient factor that the ray cast reads there. Cost: one ray a point and eye.
+//! image) and the ambient factor that the ray cast reads there, of coloured light the least of three. Cost: one ray a point and eye.
 
 use crate::draw::eyes::FrameBuffer;
 use crate::draw::eyes::Views;
@@ -39,7 +39,7 @@ impl Consistency {
         gpu: &Gpu,
         frame: &FrameBuffer,
         opacity: &Image,
-        ambient: &Image,
+        (ambient, coloured): (&Image, bool),
         points: &[Vec3],
     ) -> Result<Vec<[Seen; 2]>> {
         if points.is_empty() {
@@ -53,7 +53,11 @@ impl Consistency {
         let mut rec = gpu.recorder("consistency")?;
         let params = kernel::ConsistencyParams {
             count: points.len() as u32,
-            channels: u32::from(ambient.desc().format == Format::Rgba16Unorm),
+            channels: match ambient.desc().format {
+                Format::Rgba16Unorm if coloured => kernel::COLOURS,
+                Format::Rgba16Unorm => kernel::FEATURES,
+                _ => kernel::ONE,
+            },
         };
         let binds = kernel::MainBindings {
             opacity,
@@ -87,5 +91,6 @@ pub fn seen_by_both(
     renderer.frame().record(&mut rec, &subject.field, Views::Now(views), look, subject.reference_mm())?;
     rec.submit_and_wait()?;
     let consistency = Consistency::new(&subject.gpu)?;
-    Ok(consistency.run(&subject.gpu, renderer.frame(), fields.opacity, fields.ambient, points)?)
+    let ambient = (fields.ambient, subject.coloured());
+    Ok(consistency.run(&subject.gpu, renderer.frame(), fields.opacity, ambient, points)?)
 }

@@ -4,6 +4,7 @@ use super::vicinity::{Bindings, LinePlan, Vicinity};
 use crate::Result;
 use crate::by_brick::{Gather, Target};
 use crate::drive::{Part, Take};
+use crate::field::near::Reach;
 use crate::stages;
 use crate::subject::Subject;
 use cao_gpu::{Recorder, Stage};
@@ -33,8 +34,8 @@ impl Gather for Shaded {
         Ok(())
     }
 
-    fn reach_mm(&self) -> f32 {
-        self.plan.reach_mm
+    fn reach(&self) -> Reach {
+        Reach::Ball(self.plan.reach_mm)
     }
 
     /// The table of lines.

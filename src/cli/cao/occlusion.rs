@@ -21,7 +21,8 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     let frame = args.frame.unwrap_or_default();
     let (mut volume, turn) = frame.arrange(args.raw.open(&args.input)?)?;
     let method = args.method.unwrap_or(args::OCCLUSION);
-    let setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    let mut setup = setup(&args.settings, &volume, method, !args.needed_only)?;
+    setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
     let transfer = cao_formats::transfer::load(transfer, volume.range());
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let features = args.parts.of(FeatureSettings::default(), &volume, frame)?;
@@ -38,7 +39,17 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
 
     progress.stage("writing");
     targets.write(|files| {
-        files.nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+        if renderer.subject().coloured() {
+            let colours = renderer.read_ambient_colours()?;
+            files.nrrd_colours(
+                &args.output,
+                &volume,
+                &colours,
+                "ambient factor of red, green and blue light",
+            )?;
+        } else {
+            files.nrrd(&args.output, &volume, &renderer.read_ambient()?, "ambient factor")?;
+        }
         if let Some(path) = &args.opacity_out {
             files.nrrd(path, &volume, &renderer.read_opacity()?, "opacity per reference length, clipped")?;
         }

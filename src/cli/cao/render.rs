@@ -45,6 +45,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let transfer = args::transfer(transfer, &mut volume, &args.input)?;
     let features = args.parts.of(std::mem::take(&mut scene.features), &volume, scene.frame)?;
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
+    setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
     let look = turn.look(&scene.look);
     if !look.shading.occluded() {
         if args.budget.given() {
@@ -147,6 +148,7 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
     o.offset_mm = s.offset_mm.or(o.offset_mm);
     o.step_mm = s.step_mm.or(o.step_mm);
     o.options = s.options(o.options)?;
+    o.light = s.ambient_light.unwrap_or(o.light);
     scene.clips.extend(args::clips(matches)?);
     if let Some([width, height]) = args.size {
         (scene.image.width, scene.image.height) = (width, height);

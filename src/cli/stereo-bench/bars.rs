@@ -307,7 +307,7 @@ fn error(gpu: &Gpu, scene: &Scene, radius_voxels: f32, rays: RaySet, bar: Bar) -
     renderer.update(&mut |_| ())?;
     let (opacity, found) = (renderer.read_opacity()?, renderer.read_ambient()?);
     drop(renderer);
-    let plan = Plan { directions: 1000, steps_per_voxel: 8, max_voxels: 3000 };
+    let plan = Plan { directions: 1000, steps_per_voxel: 8, max_voxels: 3000, ..Plan::FULL };
     let reference_mm = f64::from(scene.transfer.reference_mm(scene.volume.min_spacing()));
     let radius_mm = f64::from(radius_voxels * scene.voxel());
     let offset_mm = 0.5 * scene.volume.min_spacing();

@@ -12,7 +12,7 @@ use cao_gpu::{
     Recorder, Sampler, SamplerDesc,
 };
 use cao_kernels::reference as kernel;
-use cao_model::occlusion::{Integral, Rule, fibonacci};
+use cao_model::occlusion::{Integral, Rule};
 
 /// The kernel `reference`.
 pub struct Reference {
@@ -34,9 +34,10 @@ pub struct Points {
 }
 
 impl Points {
-    /// Copies points (index coordinates of the volume without its rim) and directions to the device. Uses the device's queue
+    /// Copies points (index coordinates of the volume without its rim) and an integral's directions to the device. Uses the device's queue
     /// and waits for it.
-    pub fn upload(gpu: &Gpu, positions: &[[f64; 3]], directions: u32) -> Result<Self> {
+    pub fn upload(gpu: &Gpu, positions: &[[f64; 3]], integral: &Integral) -> Result<Self> {
+        let directions = integral.directions;
         if positions.is_empty() || directions == 0 {
             return Err(Error::refused(
                 "reference",
@@ -49,14 +50,15 @@ impl Points {
         // The rim moves every voxel by one.
         let at: Vec<[f32; 4]> =
             positions.iter().map(|p| [p[0], p[1], p[2], 0.0].map(|c| c as f32 + 1.0)).collect();
-        let mut units = fibonacci(directions);
+        let mut units = integral.lit_directions()?;
         // Neighbours in the list, which a device works on side by side, take ways of similar length.
-        units.sort_by_key(octant_order);
-        let units: Vec<[f32; 4]> = units.iter().map(|d| [d[0], d[1], d[2], 0.0].map(|c| c as f32)).collect();
+        units.sort_by_key(|(d, _)| octant_order(d));
+        let units: Vec<[f32; 4]> =
+            units.iter().map(|([x, y, z], light)| [*x, *y, *z, *light].map(|c| c as f32)).collect();
         Ok(Self {
             directions: device_buffer(gpu, "reference directions", bytemuck::cast_slice(&units))?,
             found: gpu.buffer("reference found", 4 * at.len() as u64, BufferUse::Device)?,
-            direction_count: directions,
+            direction_count: units.len() as u32,
             count: at.len() as u32,
             at: device_buffer(gpu, "reference points", bytemuck::cast_slice(&at))?,
         })

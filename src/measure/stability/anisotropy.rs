@@ -129,7 +129,7 @@ impl Scene {
     }
 
     fn occlusion(rays: RaySet, quadrature: Quadrature) -> Occlusion {
-        Occlusion { rays, quadrature, radius_mm: RADIUS, offset_mm: None, step_mm: None }
+        Occlusion { rays, quadrature, radius_mm: RADIUS, ..Occlusion::paper(1.0) }
     }
 
     fn ambient(&self, rays: RaySet, quadrature: Quadrature) -> f64 {

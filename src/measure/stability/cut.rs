@@ -75,6 +75,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         radius_mm: RADIUS,
         offset_mm: None,
         step_mm: None,
+        ..Occlusion::paper(1.0)
     };
     let mut cut = PlaneCut::new(gpu, plan.edge, occlusion, 1)?;
     let offset = 0.5;

@@ -70,6 +70,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         radius_mm: RADIUS,
         offset_mm: None,
         step_mm: None,
+        ..Occlusion::paper(1.0)
     };
     let setup = Setup { occlusion, ..Setup::of(Method::Cao, 1.0) };
     let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR)?;

@@ -22,6 +22,7 @@ pub mod pixels;
 mod plane_cut;
 mod progressive;
 pub mod radius;
+pub mod shape;
 pub mod sheets;
 pub mod shells;
 pub mod stacked_layers;
@@ -198,7 +199,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 21] = [
+pub const TRIALS: [Trial; 22] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -288,6 +289,11 @@ pub const TRIALS: [Trial; 21] = [
         name: "absorption",
         title: "Does an opaque sheet hide what lies behind it?",
         run: |_, effort, progress| absorption::run(&absorption::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "shape",
+        title: "What of each method's error does no tone mend?",
+        run: |_, effort, progress| shape::run(&shape::Plan::of(effort), progress),
     },
     Trial {
         name: "stacked-layers",

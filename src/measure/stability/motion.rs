@@ -98,6 +98,7 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         radius_mm: RADIUS,
         offset_mm: None,
         step_mm: None,
+        ..Occlusion::paper(1.0)
     };
     let (mut ambient, mut picture) = (Vec::new(), Vec::new());
     let mut stage = PlaneCut::new(gpu, plan.edge, occlusion, plan.way)?;

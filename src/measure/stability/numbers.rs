@@ -190,7 +190,7 @@ impl Even {
 const WHITE: [[f32; 4]; 1] = [[0.0, 1.0, 1.0, 1.0]];
 
 fn occlusion(quadrature: Quadrature, radius_mm: f32) -> Occlusion {
-    Occlusion { rays: RaySet::R26, quadrature, radius_mm, offset_mm: None, step_mm: None }
+    Occlusion { rays: RaySet::R26, quadrature, radius_mm, ..Occlusion::paper(1.0) }
 }
 
 /// Renders a volume whose data values are opacities.

@@ -134,6 +134,7 @@ mod tests {
                 radius_mm: 3.0,
                 offset_mm: None,
                 step_mm: None,
+                ..Occlusion::paper(1.0)
             };
             let scene = Progressive::new(&grid, &occlusion, [&empty, &slab]);
             let count = scene.directions();

@@ -85,6 +85,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             radius_mm: radius as f32,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         for (curve, voxels) in curves.iter_mut().zip(&members) {
             let values = each(voxels.len(), |i| lao_at(&grid, &opacity, &occlusion, 1.0, voxels[i]));

@@ -256,6 +256,7 @@ fn errors(normal: [f64; 3], distance: f64, thickness: f64, plan: &Plan, ways: &[
             radius_mm: RADIUS,
             offset_mm: Some(OFFSET),
             step_mm: Some(way.step),
+            ..Occlusion::paper(1.0)
         };
         match Quadrature::BRICK.contains(&way.quadrature) {
             true => rays_at(&grid, &opacity, &occlusion, 1.0, middle),

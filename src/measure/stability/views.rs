@@ -174,6 +174,7 @@ impl Stage {
             radius_mm: 5.0,
             offset_mm: None,
             step_mm: None,
+            ..Occlusion::paper(1.0)
         };
         let setup = Setup { occlusion, ..Setup::of(Method::Cao, 1.0) };
         let ready = |volume: &Volume, transfer| {

@@ -102,7 +102,7 @@ mod tests {
     }
 
     fn settings(rays: RaySet, quadrature: Quadrature, radius_mm: f32, offset_mm: Option<f32>) -> Occlusion {
-        Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm: None }
+        Occlusion { rays, quadrature, radius_mm, offset_mm, step_mm: None, ..Occlusion::paper(1.0) }
     }
 
     fn cases() -> [Case; 3] {

@@ -11,7 +11,8 @@
 //! A(x) = Σ_k w_k A_k(x),  Σ_k w_k = 1                                             CAO eq. (3)
 //! ```
 //!
-//! Eq. (3) is printed as A = 1/K Σ_k w_k A_k; the w_k here are w_k/K there.
+//! Eq. (3) is printed as A = 1/K Σ_k w_k A_k; the w_k here are w_k/K there, and of light that is not the same from everywhere the w_k' of
+//! method.md §2.1.
 //!
 //! The segments run from the offset o, where q is the mean of its values at s_0 = o − Δ/2 and s_1, to s_1 (length
 //! Δ/2), and from each sample to the next (length Δ). A segment with q below [`OPAQUE`] at both ends lets nothing
@@ -59,7 +60,7 @@ pub fn lao_at(
 /// Unit vectors in mm, as index coordinates per mm, and weights.
 pub(crate) fn rays(grid: &Grid, occlusion: &Occlusion) -> Vec<([f64; 3], f64)> {
     let per_mm = |v: [f64; 3]| std::array::from_fn(|i| v[i] / grid.spacing[i]);
-    occlusion.rays.directions().into_iter().map(|(v, weight)| (per_mm(v), weight)).collect()
+    occlusion.weighted_directions().into_iter().map(|(v, weight)| (per_mm(v), weight)).collect()
 }
 
 /// Ambient value of one voxel along given [`rays`].
@@ -162,7 +163,7 @@ mod tests {
     const UNIT: [f64; 3] = [1.0; 3];
 
     fn settings(rays: RaySet, quadrature: Quadrature, radius_mm: f32) -> Occlusion {
-        Occlusion { rays, quadrature, radius_mm, offset_mm: None, step_mm: None }
+        Occlusion { rays, quadrature, radius_mm, ..Occlusion::paper(1.0) }
     }
 
     fn close(found: f64, expected: f64, what: &str) {

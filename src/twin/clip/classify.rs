@@ -381,6 +381,7 @@ pub(crate) mod tests {
                     radius_mm,
                     offset_mm: Some(0.9),
                     step_mm: None,
+                    ..Occlusion::paper(1.0)
                 };
                 let footprints: Vec<_> =
                     (0..grid.len()).map(|i| footprint(&grid, &occlusion, grid.voxel(i))).collect();

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! h is the smallest spacing, w linear weights; V' is V_AO, but of voxels that hold 1, as those do that need no value, what V_AO and g
-//! at x make of y.
+//! at x make of y. In coloured light each of red, green and blue is so, but the way to y is along the change of their mean.
 
 use crate::{Grid, blend, trilinear_clamped};
 use cao_kernels::raycast as kernel;
@@ -18,6 +18,20 @@ pub fn ambient_at(grid: &Grid, ambient: &[f32], position: [f64; 3]) -> f64 {
     blend(air_of(grid, ambient, position), |voxel| match grid.clamped(ambient, voxel) {
         value if value < 1.0 => value,
         _ => risen,
+    })
+}
+
+/// The same in coloured light: red, green and blue.
+pub fn coloured_ambient_at(grid: &Grid, ambient: &[Vec<f32>; 3], position: [f64; 3]) -> [f64; 3] {
+    let rise = ambient.each_ref().map(|channel| rise_of(grid, channel, position).0);
+    let out = out_of(rise.iter().sum::<DVec3>() / 3.0);
+    let air = std::array::from_fn(|axis| position[axis] + voxel_of(grid)[axis] * out[axis]);
+    std::array::from_fn(|c| {
+        let risen = (trilinear_clamped(grid, &ambient[c], position) + rise[c].dot(out)).min(1.0);
+        blend(air, |voxel| match grid.clamped(&ambient[c], voxel) {
+            value if value < 1.0 => value,
+            _ => risen,
+        })
     })
 }
 
@@ -42,5 +56,10 @@ fn rise_of(grid: &Grid, ambient: &[f32], position: [f64; 3]) -> (DVec3, DVec3) {
         };
         0.5 * voxel_of(grid)[axis] * (beside(1.0) - beside(-1.0))
     }));
-    (rise, rise / rise.length().max(f64::from(kernel::LEAST_RISE)))
+    (rise, out_of(rise))
+}
+
+/// The way to y by g.
+fn out_of(rise: DVec3) -> DVec3 {
+    rise / rise.length().max(f64::from(kernel::LEAST_RISE))
 }

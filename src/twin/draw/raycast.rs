@@ -13,7 +13,7 @@
 //! more light than its ends alone say is halved, up to four times; stretches of segments are lit together, up to four steps and a voxel long or until they stop an eighth of the light.
 
 use crate::clip::clips::{ClipField, visible};
-use crate::draw::air::{air_of, ambient_at};
+use crate::draw::air::{air_of, ambient_at, coloured_ambient_at};
 use crate::draw::feature_colour::{Parts, colour_at, owner_at};
 use crate::draw::segment::{Segment, segment, varies};
 use crate::draw::shading::{Shown, shaded};
@@ -78,9 +78,29 @@ pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
         });
         ambient_at(&frame.grid, values, position)
     };
+    drawn(frame, view, size, ambient)
+}
+
+/// The same by V_AO in coloured light, red, green and blue: each as if its factors were those of all.
+pub fn raycast_coloured(frame: &Frame, ambient: &[Vec<f32>; 3], view: &View, size: [usize; 2]) -> Image {
+    let [mut red, green, blue] = [0, 1, 2]
+        .map(|c| drawn(frame, view, size, |position| coloured_ambient_at(&frame.grid, ambient, position)[c]));
+    for (i, colour) in red.colour.iter_mut().enumerate() {
+        (colour[1], colour[2]) = (green.colour[i][1], blue.colour[i][2]);
+    }
+    red
+}
+
+/// By ambient factors of index coordinates.
+fn drawn(
+    frame: &Frame,
+    view: &View,
+    size: [usize; 2],
+    ambient: impl Fn([f64; 3]) -> f64 + Sync + Copy,
+) -> Image {
     let views: Vec<View> = frame.look.offsets().into_iter().map(|at| shifted(view, size, at)).collect();
     let mean = |i| {
-        let samples = views.iter().map(|view| pixel(frame, view, size, i, &mut { ambient }));
+        let samples = views.iter().map(|view| pixel(frame, view, size, i, &mut |position| ambient(position)));
         let samples: Vec<([f32; 4], f32)> = samples.collect();
         let sum = |c: usize| samples.iter().map(|(colour, _)| f64::from(colour[c])).sum::<f64>();
         (std::array::from_fn(|c| (sum(c) / samples.len() as f64) as f32), samples[0].1)

@@ -4,7 +4,7 @@
 //! L = A k_a c + A' (k_d c d + k_s s)      d = max(n·l, 0), s = d max(n·h, 0)^shininess where a surface is, ½ and 0 where none is
 //! ```
 //!
-//! A is the ambient factor times the gain, at most 1; A' the same, or 1. n is the direction of the gradient of the values, just behind a
+//! A is the ambient factor times the gain, at most 1; A' the same, or 1. In coloured light both are red's for red, and so on. n is the direction of the gradient of the values, just behind a
 //! cut the normal of what cut. How much of a surface there is, and which side is out, is what opacity does a voxel along n and back.
 
 use crate::draw::clip_normal::clip_normal;

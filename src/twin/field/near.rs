@@ -1,8 +1,17 @@
 //! Which bricks an edit concerns (method.md §5.2): those with a voxel within `reach` mm of a voxel of a changed brick that need a value, or
-//! have some that nothing needs any more.
+//! have some that nothing needs any more; or with one that is within so many voxels of it along every axis.
 
 use crate::Grid;
 use crate::field::bricks::{EDGE, bricks};
+
+/// How far a change reaches.
+#[derive(Clone, Copy, Debug)]
+pub enum Reach {
+    /// In mm.
+    Ball(f64),
+    /// In voxels along each axis.
+    Box([usize; 3]),
+}
 
 /// Of each brick of [`bricks`]: whether it is to be computed, and whether it has values then, where `valued` says which had some before. A
 /// voxel needs a value if it or a neighbour has opacity; all do if `unneeded`.
@@ -11,7 +20,7 @@ pub fn near(
     opacity: &[u16],
     changed: &[bool],
     valued: &[bool],
-    reach_mm: f64,
+    reach: Reach,
     unneeded: bool,
 ) -> Vec<[bool; 2]> {
     let all = bricks(grid);
@@ -22,19 +31,20 @@ pub fn near(
             needed[all.index(voxel.map(|c| c / EDGE))] = true;
         }
     }
-    let apart = |a: [usize; 3], b: [usize; 3]| -> f64 {
-        (0..3)
-            .map(|axis| {
-                // Between whole bricks: cut short at the upper end, a brick is no farther away.
-                let between = EDGE * a[axis].abs_diff(b[axis]);
-                (between.saturating_sub(EDGE - 1) as f64 * grid.spacing[axis]).powi(2)
-            })
-            .sum::<f64>()
-            .sqrt()
+    // Between whole bricks: cut short at the upper end, a brick is no farther away.
+    let apart = |a: [usize; 3], b: [usize; 3]| -> [usize; 3] {
+        std::array::from_fn(|i| (EDGE * a[i].abs_diff(b[i])).saturating_sub(EDGE - 1))
+    };
+    let within = |voxels: [usize; 3]| match reach {
+        Reach::Ball(mm) => {
+            let squared = |i: usize| (voxels[i] as f64 * grid.spacing[i]).powi(2);
+            (0..3).map(squared).sum::<f64>().sqrt() <= mm
+        }
+        Reach::Box(most) => (0..3).all(|i| voxels[i] <= most[i]),
     };
     (0..all.len())
         .map(|i| {
-            let close = |j: usize| changed[j] && apart(all.voxel(i), all.voxel(j)) <= reach_mm;
+            let close = |j: usize| changed[j] && within(apart(all.voxel(i), all.voxel(j)));
             match (0..all.len()).any(close) {
                 true => [needed[i] || valued[i], needed[i]],
                 false => [false, valued[i]],
@@ -56,12 +66,13 @@ mod tests {
         opacity[grid.index([35, 4, 4])] = 9;
         let changed = [true, false, false, false, false];
         // Nearest voxels of neighbours are half a millimetre apart, of the next bricks 4.5, then 8.5 and 12.5.
-        let chosen = |changed, reach, unneeded| {
+        let within = |changed, reach, unneeded| {
             near(&grid, &opacity, changed, &[false; 5], reach, unneeded)
                 .into_iter()
                 .map(|[to_do, _]| to_do)
                 .collect::<Vec<_>>()
         };
+        let chosen = |changed, mm, unneeded| within(changed, Reach::Ball(mm), unneeded);
         let found = |reach, unneeded| chosen(&changed, reach, unneeded);
         assert_eq!(found(0.4, false), [false; 5]);
         assert_eq!(found(0.5, false), [false, true, false, false, false]);
@@ -71,8 +82,13 @@ mod tests {
         assert_eq!(chosen(&[false; 5], 99.0, true), [false; 5]);
         // The first and the fourth have values that nothing needs; the fourth is out of reach.
         assert_eq!(
-            near(&grid, &opacity, &changed, &[true, false, false, true, true], 4.5, false),
+            near(&grid, &opacity, &changed, &[true, false, false, true, true], Reach::Ball(4.5), false),
             [[true, false], [true, true], [true, true], [false, true], [false, true]]
         );
+        // In voxels: the third brick is 9 away, whatever their size.
+        let boxed = |voxels| within(&changed, Reach::Box([voxels, 0, 0]), true);
+        assert_eq!(boxed(0), [true, false, false, false, false]);
+        assert_eq!(boxed(8), [true, true, false, false, false]);
+        assert_eq!(boxed(9), [true, true, true, false, false]);
     }
 }

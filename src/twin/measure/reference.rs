@@ -4,8 +4,8 @@
 //! 0 outside the volume:
 //!
 //! ```text
-//! ambient  A(x) = 1/4π ∫ dω 1/(R − o) ∫_o^R exp(−∫_o^s τ) ds
-//! literal  A(x) = 1/4π ∫ dω 1/M Σ_m Π_{i<m} (1 − a_i)^(Δ/ℓ)        CAO eq. (2) and (3) with ever more rays
+//! ambient  A(x) = 1/4π ∫ L(ω) dω 1/(R − o) ∫_o^R exp(−∫_o^s τ) ds                 L: light from ω, its mean 1
+//! literal  A(x) = 1/4π ∫ L(ω) dω 1/M Σ_m Π_{i<m} (1 − a_i)^(Δ/ℓ)        CAO eq. (2) and (3) with ever more rays
 //! ```
 //!
 //! The ambient integral takes τ as constant over each step h, at its middle: a step of depth t = hτ adds
@@ -13,10 +13,13 @@
 
 use crate::cast::lao::{OPAQUE, mean_transmittance};
 use crate::{Grid, each, trilinear};
-use cao_model::occlusion::{Integral, Rule, fibonacci};
+use cao_model::occlusion::{Integral, Rule};
 
 /// Ambient value at each position (index coordinates), 0 = fully occluded … 1 = unobstructed. `opacity` is V_o, per
 /// `reference_mm`.
+///
+/// # Panics
+/// With coloured light, or light from nowhere.
 pub fn reference(
     grid: &Grid,
     opacity: &[f32],
@@ -24,7 +27,7 @@ pub fn reference(
     reference_mm: f64,
     positions: &[[f64; 3]],
 ) -> Vec<f64> {
-    let directions = fibonacci(integral.directions);
+    let directions = integral.lit_directions().expect("light of one colour");
     let ray = |at: [f64; 3], direction: &[f64; 3]| {
         let opacity_at = |m: u32| {
             let s = integral.first_mm + f64::from(m) * integral.step_mm;
@@ -37,7 +40,8 @@ pub fn reference(
         if integral.samples == 0 || integral.directions == 0 {
             return 1.0;
         }
-        directions.iter().map(|d| ray(positions[i], d)).sum::<f64>() / f64::from(integral.directions)
+        directions.iter().map(|(d, light)| light * ray(positions[i], d)).sum::<f64>()
+            / directions.len() as f64
     })
 }
 
@@ -63,6 +67,7 @@ fn along(integral: &Integral, ratio: f64, opacity_at: impl Fn(u32) -> f64) -> f6
 mod tests {
     use super::*;
     use crate::random::Random;
+    use cao_model::light::AmbientLight;
 
     fn close(found: f64, expected: f64, tolerance: f64) {
         assert!((found - expected).abs() < tolerance, "{found}, expected {expected}");
@@ -124,6 +129,22 @@ mod tests {
             close(found(8), expected, 0.5 / 8.0 / (r - o) + 1e-3);
             close(found(64), expected, 0.5 / 64.0 / (r - o) + 1e-3);
         }
+    }
+
+    /// In a sky's light from behind the wall, of which 2u du comes at cosines of u, A = 1 − 2 ∫ u (R − d/u)/L du = 1 − (R − d)²/(RL); in one from
+    /// the other side all of it.
+    #[test]
+    fn an_opaque_wall_in_front_of_a_sky_has_its_closed_form() {
+        let opacity: Vec<f32> =
+            (0..BLOCK.len()).map(|i| if BLOCK.voxel(i)[0] >= 12 { 1.0 } else { 0.0 }).collect();
+        let (r, o, d) = (7.5, 0.5, 3.0);
+        let found = |x| {
+            let light = AmbientLight::Sky([x, 0.0, 0.0]);
+            let rays = Integral { light, ..Integral::ambient(r, o, 64, 4000, 1.0) };
+            reference(&BLOCK, &opacity, &rays, 1e-4, &[[8.0; 3]])[0]
+        };
+        close(found(1.0), 1.0 - (r - d) * (r - d) / (r * (r - o)), 0.5 / 64.0 / (r - o) + 2e-3);
+        close(found(-3.0), 1.0, 1e-12);
     }
 
     /// One ray through opacity linear from 0.1 to 0.8 over 8 mm: halving the step quarters the error.

@@ -1,3 +1,4 @@
 //! Volumes of mean opacities over cubes.
 
 pub mod level;
+pub mod tiles;

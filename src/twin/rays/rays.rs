@@ -14,7 +14,8 @@
 //!
 //! f is a table: 257 values in 65536ths, at a = 256 i / 65535, the nearest is taken. A ray with T < 64 has ended: with `linear` after any
 //! cell, with `hybrid` after the near ones and after every second far one, with `nearest` after every fourth, but for those behind the last
-//! whole group before M. Lengths are f32, as settings are.
+//! whole group before M. Lengths are f32, as settings are. w_k are the weights in the light that there is (method.md §2.1); of coloured light each
+//! channel has the values of its own grey one.
 
 use crate::{Grid, each, trilinear};
 use cao_kernels::rays::{DARK, FEW, MANY, NEAR};
@@ -99,7 +100,7 @@ impl<'a> Rays<'a> {
             grid,
             floats,
             means: (0..256).map(mean).chain([0]).collect(),
-            directions: occlusion.rays.directions().into_iter().map(direction).collect(),
+            directions: occlusion.weighted_directions().into_iter().map(direction).collect(),
             cells,
             shift: occlusion.offset_mm.map_or(0.0, |offset| offset / step_mm - 0.5),
             near,

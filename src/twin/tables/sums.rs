@@ -47,4 +47,24 @@ mod tests {
         assert_eq!(extinction_of(65535, 255, 11.09), 255);
         assert_eq!(extinction_of(0, 255, 11.09), 0);
     }
+
+    /// Half a part at most, and somewhere that: 7.6e-6 at 16 bits, of opacities that V_o rounds first; of 65535ths no 16 bits take anything.
+    #[test]
+    fn an_opacity_is_off_by_half_a_part_at_most() {
+        let most = |bits: u32, places: u32| {
+            let levels = (1_u32 << bits) - 1;
+            let off = |step: u32| {
+                let a = f64::from(step) / f64::from(places);
+                let texel = (65535.0 * a).round() as u16;
+                (f64::from(levels_of(texel, levels)) / f64::from(levels) - a).abs()
+            };
+            (0..=places).map(off).fold(0.0, f64::max)
+        };
+        let (rounded, none) = (most(16, 8 * 65535), most(16, 65535));
+        assert!((rounded - 7.63e-6).abs() < 1e-8 && none < 1e-12, "{rounded} {none}");
+        for (bits, expected) in [(15, 1.53e-5), (13, 6.1e-5), (10, 4.89e-4), (8, 1.96e-3)] {
+            let found = most(bits, 65535);
+            assert!((found / expected - 1.0).abs() < 0.01, "{bits}: {found}");
+        }
+    }
 }
