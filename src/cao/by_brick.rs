@@ -66,16 +66,10 @@ pub trait Gather: Send + Sync + Sized {
         None
     }
 
-    /// What it makes of V_o, as it is now and after these changes, in bricks with 0 in `change`, before it computes values of the bricks of any
-    /// list: its own volumes, for instance. As many parts each time: an update that spans frames counts them.
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        change: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
-        let _ = (on, opacity, change, changed);
+    /// What it makes of V_o, after these changes, before it computes values of the bricks of any list: its own volumes, for instance. As many
+    /// parts each time: an update that spans frames counts them.
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
+        let _ = (on, from, changed);
         Vec::new()
     }
 
@@ -85,6 +79,15 @@ pub trait Gather: Send + Sync + Sized {
     /// Computes the listed bricks, or some of them: a value in every voxel that needs one, 1 in the others. Ordered after what
     /// [`Self::prepare`] wrote by its own barriers, V_o is ready to be sampled and read.
     fn record(&self, rec: &mut Recorder, to: &Target, take: &Take) -> Result<()>;
+}
+
+/// V_o as it is now.
+#[derive(Clone, Copy)]
+pub struct Carved<'a> {
+    /// V_o.
+    pub opacity: &'a Image,
+    /// 0 of each brick in which it changed since the last update; says nothing where values are computed anew.
+    pub change: &'a Buffer,
 }
 
 /// What is computed, and where its values go.
@@ -211,6 +214,10 @@ impl<G: Gather> ByBrick<G> {
         Target { on, opacity: &self.volumes.opacity, list, ambient }
     }
 
+    fn carved(&self) -> Carved<'_> {
+        Carved { opacity: &self.volumes.opacity, change: &self.volumes.change }
+    }
+
     /// V_o in place, and which bricks changed.
     fn carve<'a>(&'a self, on: &'a Subject, changed: Changed) -> Part<'a> {
         let (k, v) = (&self.kernels, &self.volumes);
@@ -298,7 +305,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         if changed.features {
             parts.extend(self.gather.changed(on, &v.change));
         }
-        parts.extend(self.gather.prepare(on, &v.opacity, &v.change, changed));
+        parts.extend(self.gather.prepare(on, self.carved(), changed));
         parts.extend([self.choose(to, &v.todo, Self::anew(changed)), self.compute(to)]);
         parts
     }
@@ -328,7 +335,7 @@ impl<G: Gather> Ambient for ByBrick<G> {
         let list = BrickList::new(&on.gpu, &on.field)?;
         let todo = on.gpu.buffer("all bricks to do", v.todo.bytes(), BufferUse::Device)?;
         let to = self.target(on, &list, into);
-        let mut parts = self.gather.prepare(on, &v.opacity, &v.change, RECOMPUTED);
+        let mut parts = self.gather.prepare(on, self.carved(), RECOMPUTED);
         parts.extend([self.choose(to, &todo, true), self.compute(to)]);
         let timings = drive::run(&on.gpu, &parts, &mut Pace::default(), progress)?;
         drop(parts);

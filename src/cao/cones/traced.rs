@@ -3,13 +3,13 @@
 use super::cone::{Bindings, ConePlan, ConeTracing};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
 use crate::pyramid::levels::{LevelImages, MakeLevels};
 use crate::pyramid::plan::Plan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 
 /// Mip levels, and cones through them.
@@ -62,14 +62,8 @@ impl Gather for Cones {
         }))
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        _: &'a Buffer,
-        _: Changed,
-    ) -> Vec<Part<'a>> {
-        self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, opacity)
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, _: Changed) -> Vec<Part<'a>> {
+        self.make.parts(on.field.min_spacing() / on.ambient_mm, &self.levels, from.opacity)
     }
 
     fn stage(&self) -> (Stage, u32) {

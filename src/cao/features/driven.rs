@@ -9,12 +9,12 @@ use super::labels::Labels;
 use super::mask::{Mask, Masked};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
 use crate::rays::rays::RayPlan;
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Format, Image, Recorder, Stage};
+use cao_gpu::{Buffer, Format, Recorder, Stage};
 use cao_model::options::Combine;
 use cao_model::settings::Setup;
 
@@ -85,18 +85,12 @@ impl Gather for Driven {
         })
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        change: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
         if self.masked.images.is_empty() {
             return Vec::new();
         }
         vec![Part::short(stages::MASK, move |rec| {
-            let labels = &self.labels.image;
+            let (labels, Carved { opacity, change }) = (&self.labels.image, from);
             Ok(self.mask.record(rec, &on.field, changed.anew, opacity, labels, change, &self.masked)?)
         })]
     }

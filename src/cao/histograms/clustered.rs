@@ -9,11 +9,11 @@ use super::expand::{Bindings, Expand, Scene};
 use super::histogram::{Histogram, HistogramPlan, MOST_FINE};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::Setup;
 use std::sync::{Mutex, PoisonError};
 
@@ -81,13 +81,7 @@ impl Gather for Clustered {
         1.01 * self.diagonal
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        _: &'a Image,
-        _: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, _: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
         let (histogram, clusters, field) = (&self.histogram, &self.clusters, &on.field);
         let sampled = &histogram.sampled;
         let mut parts = vec![Part::long(stages::HISTOGRAMS, move |rec| {

@@ -7,11 +7,11 @@ use super::boxes::{Bindings, BoxPlan, Boxes};
 use super::sums::{Counted, Sums};
 use crate::Result;
 use crate::ambient::Changed;
-use crate::by_brick::{Gather, Target};
+use crate::by_brick::{Carved, Gather, Target};
 use crate::drive::{Part, Take};
 use crate::stages;
 use crate::subject::Subject;
-use cao_gpu::{Buffer, Image, Recorder, Stage};
+use cao_gpu::{Recorder, Stage};
 use cao_model::settings::{AntiAliasing, MapSettings, Setup};
 use std::sync::{Mutex, PoisonError};
 
@@ -59,20 +59,14 @@ impl<const SHELLS: bool> Gather for Summed<SHELLS> {
         Some(Part::short(stages::SHELLS, |rec| Ok(self.boxes.record_shells(rec, &self.plan)?)))
     }
 
-    fn prepare<'a>(
-        &'a self,
-        on: &'a Subject,
-        opacity: &'a Image,
-        _: &'a Buffer,
-        changed: Changed,
-    ) -> Vec<Part<'a>> {
+    fn prepare<'a>(&'a self, on: &'a Subject, from: Carved<'a>, changed: Changed) -> Vec<Part<'a>> {
         let counted = self.plan.counted;
         let wanted = Some((counted, on.setup.anti_aliasing, on.setup.maps));
         vec![Part::long(stages::SUMS, move |rec| {
             let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
             // A radius alone changes no opacity.
             if *held != wanted || changed.opacities || changed.clips {
-                self.sums.record(rec, &on.field, opacity, counted)?;
+                self.sums.record(rec, &on.field, from.opacity, counted)?;
                 *held = wanted;
             }
             Ok(())
