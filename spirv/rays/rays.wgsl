@@ -2,7 +2,9 @@
 // then the group takes pairs (voxel, direction), voxels fastest, so that a subgroup shares its direction. What a ray contributes is whole
 // numbers, so sums are exact in any order, and a value depends on nothing but the opacities that its rays meet.
 //
-// What a rule of rays is stands in walk.wgsl.
+// A rule says how many cells of a ray, near its voxel, have the filter's opacity in their middle, the first cell in each of its
+// halves: none (`nearest`), NEAR (`hybrid`) or all (`linear`). The others have that of the voxel nearest to their middle, found in
+// whole UNITths of a voxel.
 //
 // The entry points `..._coloured` are the same in coloured light: three sums a voxel.
 

@@ -1,9 +1,6 @@
 // A ray of rays by brick (method.md section 4): what its cells leave of the light, by a rule. Needs the bindings `opacity`, `field`, linear and
 // transparent outside the volume, and `directions`, and `params.dims`, `params.cells`, `params.exponent`, `params.shift`.
-//
-// A rule says how many cells of a ray, near its voxel, have the filter's opacity in their middle, the first cell in each of its
-// halves: none (`nearest`), NEAR (`hybrid`) or all (`linear`). The others have that of the voxel nearest to their middle, found in
-// whole UNITths of a voxel.
+// What a rule is stands in rays.wgsl.
 
 #include "shared/whole_rays.wgsl"
 
