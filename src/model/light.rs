@@ -186,7 +186,7 @@ impl AmbientLight {
         }
         for (c, name) in ["red", "green", "blue"].into_iter().enumerate() {
             let sum: f64 = directions.iter().map(|&(d, weight)| weight * self.from(d)[c]).sum();
-            if !directions.is_empty() && !(sum.is_finite() && sum > 0.0) {
+            if !(directions.is_empty() || sum.is_finite() && sum > 0.0) {
                 return refuse(format!(
                     "no {name} light comes along any of the rays {rays}; expected some, negative light counts as none"
                 ));

@@ -23,6 +23,7 @@ use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
+use cao_model::light::AmbientLight;
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -235,7 +236,10 @@ fn pictures_in_coloured_light_are_those_of_the_twin() {
         pose: Pose { translate_mm: Vec3::new(4.0, -6.0, 5.0), scale: Vec3::splat(7.0), ..Pose::default() },
     };
     let mut setup = Setup::of(Method::Rays, volume.min_spacing());
-    (setup.occlusion.light, setup.occlusion.radius_mm) = (coloured_light(), 5.0);
+    // Red from one side, blue from the other, green from a third: what is taken for another colour's is far from it.
+    let sides = [[1.0; 3], [0.0, 2.0, 0.0], [0.0; 3], [2.5, 0.0, -2.5]];
+    setup.occlusion.light = AmbientLight::harmonics(&sides).unwrap();
+    setup.occlusion.radius_mm = 5.0;
     let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
     renderer.set_clips(std::slice::from_ref(&clip)).unwrap();
     renderer.update(&mut |_| ()).unwrap();
