@@ -243,9 +243,7 @@ fn pictures_in_coloured_light_are_those_of_the_twin() {
     let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
     renderer.set_clips(std::slice::from_ref(&clip)).unwrap();
     renderer.update(&mut |_| ()).unwrap();
-    let look = Look { step_mm: Some(0.5), gain: 1.0, ..Look::default() };
     let views = framing(&volume, 40.0, 15.0);
-    let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
     let grid = grid_of(&volume);
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
     let colours = renderer.read_ambient_colours().unwrap();
@@ -256,26 +254,33 @@ fn pictures_in_coloured_light_are_those_of_the_twin() {
         resolution: MAPS.resolution,
         dilation: Dilation::Conservative(MAPS.cells),
     };
-    let frame = twin::draw::raycast::Frame {
-        grid,
-        values: &values,
-        parts: None,
-        transfer: &transfer,
-        reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
-        ambient: &renderer.read_ambient().unwrap(),
-        clips: &[ClipField::new(&clip, &grid, 5.0, &maps).unwrap()],
-        step_mm: 0.5,
-        look,
-    };
-    let size = SIZE.map(|s| s as usize);
-    let drawn = |eye: usize| twin::draw::raycast::raycast_coloured(&frame, &colours, &views[eye], size);
-    let nearest =
-        views[0].position.length() - 0.5 * Vec3::from_array(volume.size_mm().map(|s| s as f32)).length();
-    compare(&found, &[drawn(0), drawn(1)], &views, 0.5, nearest.max(1.0), "coloured");
-    let grey = twin::draw::raycast::raycast(&frame, &views[0], size);
-    let apart = |(f, g): (&[f32; 4], &[f32; 4])| (0..3).any(|c| (f[c] - g[c]).abs() > COLOUR_TOLERANCE);
-    let other = found.colour[0].iter().zip(&grey.colour).filter(|pair| apart(*pair)).count();
-    assert!(other > 100, "{other} pixels have a colour");
+    let ambient = renderer.read_ambient().unwrap();
+    let fields = [ClipField::new(&clip, &grid, 5.0, &maps).unwrap()];
+    // The ambient term alone, and beside diffuse light, which has no colour.
+    for shading in [Shading::Ao, Shading::PhongAo] {
+        let look = Look { step_mm: Some(0.5), gain: 1.0, shading, ..Look::default() };
+        let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
+        let frame = twin::draw::raycast::Frame {
+            grid,
+            values: &values,
+            parts: None,
+            transfer: &transfer,
+            reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
+            ambient: &ambient,
+            clips: &fields,
+            step_mm: 0.5,
+            look,
+        };
+        let size = SIZE.map(|s| s as usize);
+        let drawn = |eye: usize| twin::draw::raycast::raycast_coloured(&frame, &colours, &views[eye], size);
+        let nearest =
+            views[0].position.length() - 0.5 * Vec3::from_array(volume.size_mm().map(|s| s as f32)).length();
+        compare(&found, &[drawn(0), drawn(1)], &views, 0.5, nearest.max(1.0), &format!("{shading:?}"));
+        let grey = twin::draw::raycast::raycast(&frame, &views[0], size);
+        let apart = |(f, g): (&[f32; 4], &[f32; 4])| (0..3).any(|c| (f[c] - g[c]).abs() > COLOUR_TOLERANCE);
+        let other = found.colour[0].iter().zip(&grey.colour).filter(|pair| apart(*pair)).count();
+        assert!(other > 100, "{shading:?}: {other} pixels have a colour");
+    }
     drop(renderer);
     close(gpu);
 }
