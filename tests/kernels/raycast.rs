@@ -23,6 +23,7 @@ use cao_measure::random::Random;
 use cao_model::builtin::builtin_box;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::feature::{Feature, Features};
+use cao_model::light::AmbientLight;
 use cao_model::look::{Look, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
@@ -227,22 +228,30 @@ fn pictures_are_those_of_the_twin() {
 #[test]
 fn pictures_in_coloured_light_are_those_of_the_twin() {
     let gpu = open();
-    let volume = builtin_box("fruit", [21, 25, 17], [1.0, 1.2, 1.5]).unwrap();
-    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    // A ball with a sharp edge: two voxels out none has a value, so that what stands for them is read.
+    let grid = Grid { dims: [20, 22, 18], spacing: [1.0, 0.9, 1.2] };
+    let ball = |i: usize| {
+        let r2: f64 = grid.to_world(grid.voxel(i).map(|c| c as f64)).iter().map(|c| c * c).sum();
+        if r2 < 49.0 { 200 } else { 0 }
+    };
+    let volume =
+        Volume::new(grid.dims, grid.spacing, Values::U8((0..grid.len()).map(ball).collect())).unwrap();
+    let transfer =
+        TransferFunction::new(vec![[80.0, 0.0], [120.0, 0.9]], vec![[0.0, 0.9, 0.9, 0.9]], None).unwrap();
     let clip = Clip {
         shape: Shape::Sphere,
         mode: Mode::Remove,
         pose: Pose { translate_mm: Vec3::new(4.0, -6.0, 5.0), scale: Vec3::splat(7.0), ..Pose::default() },
     };
     let mut setup = Setup::of(Method::Rays, volume.min_spacing());
-    (setup.occlusion.light, setup.occlusion.radius_mm) = (coloured_light(), 5.0);
+    // Red from one side, blue from the other, green from a third: what is taken for another colour's is far from it.
+    let sides = [[1.0; 3], [0.0, 2.0, 0.0], [0.0; 3], [2.5, 0.0, -2.5]];
+    setup.occlusion.light = AmbientLight::harmonics(&sides).unwrap();
+    setup.occlusion.radius_mm = 5.0;
     let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
     renderer.set_clips(std::slice::from_ref(&clip)).unwrap();
     renderer.update(&mut |_| ()).unwrap();
-    let look = Look { step_mm: Some(0.5), gain: 1.0, ..Look::default() };
     let views = framing(&volume, 40.0, 15.0);
-    let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
-    let grid = grid_of(&volume);
     let values: Vec<f32> = (0..volume.len()).map(|i| volume.value(i) as f32).collect();
     let colours = renderer.read_ambient_colours().unwrap();
     let colours: [Vec<f32>; 3] = std::array::from_fn(|c| colours.iter().map(|v| v[c]).collect());
@@ -252,26 +261,33 @@ fn pictures_in_coloured_light_are_those_of_the_twin() {
         resolution: MAPS.resolution,
         dilation: Dilation::Conservative(MAPS.cells),
     };
-    let frame = twin::draw::raycast::Frame {
-        grid,
-        values: &values,
-        parts: None,
-        transfer: &transfer,
-        reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
-        ambient: &renderer.read_ambient().unwrap(),
-        clips: &[ClipField::new(&clip, &grid, 5.0, &maps).unwrap()],
-        step_mm: 0.5,
-        look,
-    };
-    let size = SIZE.map(|s| s as usize);
-    let drawn = |eye: usize| twin::draw::raycast::raycast_coloured(&frame, &colours, &views[eye], size);
-    let nearest =
-        views[0].position.length() - 0.5 * Vec3::from_array(volume.size_mm().map(|s| s as f32)).length();
-    compare(&found, &[drawn(0), drawn(1)], &views, 0.5, nearest.max(1.0), "coloured");
-    let grey = twin::draw::raycast::raycast(&frame, &views[0], size);
-    let apart = |(f, g): (&[f32; 4], &[f32; 4])| (0..3).any(|c| (f[c] - g[c]).abs() > COLOUR_TOLERANCE);
-    let other = found.colour[0].iter().zip(&grey.colour).filter(|pair| apart(*pair)).count();
-    assert!(other > 100, "{other} pixels have a colour");
+    let ambient = renderer.read_ambient().unwrap();
+    let fields = [ClipField::new(&clip, &grid, 5.0, &maps).unwrap()];
+    // The ambient term alone, and beside diffuse light, which has no colour.
+    for shading in [Shading::Ao, Shading::PhongAo] {
+        let look = Look { step_mm: Some(0.5), gain: 1.0, shading, ..Look::default() };
+        let (found, _) = renderer.draw(&views, &look, SIZE).unwrap();
+        let frame = twin::draw::raycast::Frame {
+            grid,
+            values: &values,
+            parts: None,
+            transfer: &transfer,
+            reference_mm: f64::from(transfer.reference_mm(volume.min_spacing())),
+            ambient: &ambient,
+            clips: &fields,
+            step_mm: 0.5,
+            look,
+        };
+        let size = SIZE.map(|s| s as usize);
+        let drawn = |eye: usize| twin::draw::raycast::raycast_coloured(&frame, &colours, &views[eye], size);
+        let nearest =
+            views[0].position.length() - 0.5 * Vec3::from_array(volume.size_mm().map(|s| s as f32)).length();
+        compare(&found, &[drawn(0), drawn(1)], &views, 0.5, nearest.max(1.0), &format!("{shading:?}"));
+        let grey = twin::draw::raycast::raycast(&frame, &views[0], size);
+        let apart = |(f, g): (&[f32; 4], &[f32; 4])| (0..3).any(|c| (f[c] - g[c]).abs() > COLOUR_TOLERANCE);
+        let other = found.colour[0].iter().zip(&grey.colour).filter(|pair| apart(*pair)).count();
+        assert!(other > 100, "{shading:?}: {other} pixels have a colour");
+    }
     drop(renderer);
     close(gpu);
 }
