@@ -110,21 +110,23 @@ pub fn scenes(plan: &Plan, files: Vec<(String, Volume)>) -> Result<Vec<Scene>> {
         .collect()
 }
 
-/// The n-th scene's clip, `share` of the volume's mean edge large: sphere, cube, rectangular prism, before the corner that the eyes look at.
+/// The n-th scene's clip, `share` of the volume's mean edge large: sphere, cube, rectangular prism, towards the corner that the eyes look at.
+/// A cube right before it leaves the volume before it affects as much as the paper's.
 fn clip(n: usize, volume: &Volume, share: f64) -> Clip {
-    let (mesh, form) = match n {
-        0 => (TriangleMesh::sphere(3), Vec3::ONE),
-        1 => (TriangleMesh::cuboid(), Vec3::ONE),
-        _ => (TriangleMesh::cuboid(), Vec3::new(0.7, 0.7, 1.6)),
+    let (mesh, form, out) = match n {
+        0 => (TriangleMesh::sphere(3), Vec3::ONE, 1.0),
+        1 => (TriangleMesh::cuboid(), Vec3::ONE, 0.5),
+        _ => (TriangleMesh::cuboid(), Vec3::new(0.7, 0.7, 1.6), 0.5),
     };
-    shaped(mesh, form, volume, share)
+    shaped(mesh, form, out, volume, share)
 }
 
-fn shaped(mesh: TriangleMesh, form: Vec3, volume: &Volume, share: f64) -> Clip {
+/// `out`: of the way to that corner.
+fn shaped(mesh: TriangleMesh, form: Vec3, out: f32, volume: &Volume, share: f64) -> Clip {
     let size = volume.size_mm();
     let edge = size.iter().sum::<f64>() / 3.0;
     let pose = Pose {
-        translate_mm: Vec3::new(0.2, -0.25, 0.2) * Vec3::from_array(size.map(|s| s as f32)),
+        translate_mm: out * Vec3::new(0.2, -0.25, 0.2) * Vec3::from_array(size.map(|s| s as f32)),
         scale: form * (share * edge) as f32,
         ..Pose::default()
     };
@@ -384,7 +386,7 @@ fn picture(gpu: &Gpu, scene: &Scene, clip: &Clip, how: AntiAliasing, plan: &Plan
 }
 
 fn torus(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<(u32, String, Picture)> {
-    let mut clip = shaped(TriangleMesh::torus(48, 24), Vec3::ONE, &scene.volume, 0.25);
+    let mut clip = shaped(TriangleMesh::torus(48, 24), Vec3::ONE, 1.0, &scene.volume, 0.25);
     // It lies on the corner, seen from the eyes.
     clip.pose.rotate_deg = Vec3::new(60.0, 0.0, 30.0);
     let shows = format!("{}: a torus clip, 54 rays", scene.name);
