@@ -65,7 +65,7 @@ pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) 
     body += &section("What a clip makes recompute", "Table 2 of the paper, and ours.");
     body += &tables::table_2(chart);
     body += &section("Frame rates while the clip moves", "Table 3 of the paper, and ours.");
-    body += &tables::table_3(chart);
+    body += &tables::table_3(chart, false);
     body += &section(
         "What a frame is spent on",
         "As the paper's Fig. 9: median times of the stages of a frame in which the clip moved, both eyes.",
