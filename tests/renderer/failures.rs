@@ -30,7 +30,7 @@ fn an_update_whose_progress_panicked_is_done_anew() {
         let mut random = Random::new(91 + case as u64);
         let mut scene = scene(&mut random, NAMES[case % NAMES.len()], method);
         let mut renderer = scene.renderer(&gpu);
-        for turn in 0..if kinds().contains(&method) { 24 } else { 8 } {
+        for turn in 0..if kinds().contains(&method) { 16 } else { 5 } {
             let mut edits = vec![scene.edit(&mut random, &mut renderer)];
             // At the first call, at the second, and so on, of updates that always have another edit to make.
             for at in 0.. {

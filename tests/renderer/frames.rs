@@ -142,7 +142,7 @@ fn frames(host: &Host, gpu: &Gpu, name: &str, method: Method, seed: u64, frames:
 
 #[test]
 fn any_sequence_of_recorded_frames_is_that_of_a_fresh_renderer() {
-    const FRAMES: [usize; 2] = [200, 50];
+    const FRAMES: [usize; 2] = [200, 35];
     let host = Host::new();
     let gpu = host.adopted(Some(host.queue));
     for (case, method) in methods().enumerate() {
