@@ -410,14 +410,15 @@ fn volumes_of_any_size_are_drawn_and_verified_alike() {
         ["near.png", "far.png"].map(|name| picture(&folder, name))
     };
     let ordinary = drawn("");
-    for unit in ["e-9", "e-6", "e-3", "e3", "e6", "e8"] {
+    // More of them: renderer::lengths.
+    for unit in ["e-9", "e-3", "e8"] {
         for (found, expected) in drawn(unit).iter().zip(&ordinary) {
             let apart = found.as_raw().iter().zip(expected.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
             assert!(apart <= Some(1), "{unit}: {apart:?} levels");
         }
     }
     assert!(ordinary[0].pixels().filter(|p| p.0[1] > 80).count() > 300, "much is seen");
-    for unit in ["1e-9", "1e-6", "1e6"] {
+    for unit in ["1e-9", "1e6"] {
         let answer =
             folder.json(&format!("verify builtin:fruit:24:{unit},{unit},{unit} --poses 2 --method all"));
         assert_eq!(answer["exact"], true, "{answer}");
