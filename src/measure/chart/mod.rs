@@ -236,14 +236,19 @@ fn is_baseline(method: &str, setting: &Setting) -> bool {
     method == BASELINE && setting.label == RaySet::R26.name()
 }
 
-/// Device memory that contenders may take at a time; where they need more, they compete in groups, the baseline in each.
-const MEMORY: usize = 1 << 30;
+/// Device memory that contenders may take at a time on a software driver, whose memory is everybody's; of another device they may take half of what it
+/// has. Where they need more, they compete in groups, the baseline in each.
+const MEMORY: u64 = 1 << 30;
 /// Bytes a voxel of one contender (`Volumes`, the volume, and a little; five levels of N-buffers in a volume of 48³ take 17).
 const VOXEL: usize = 28;
 
 /// How many compete with the baseline at a time.
-fn group(scene: &Scene) -> usize {
-    (MEMORY / (VOXEL * scene.volume.len()).max(1)).max(2) - 1
+fn group(gpu: &Gpu, scene: &Scene) -> usize {
+    let memory = match gpu.info().kind {
+        DeviceKind::Cpu => MEMORY,
+        _ => gpu.info().device_memory / 2,
+    };
+    (memory as usize / (VOXEL * scene.volume.len()).max(1)).max(2) - 1
 }
 
 /// Points of the surface at which image-space methods are held to the reference.
@@ -275,10 +280,10 @@ pub fn foresee(gpu: &Gpu, scenes: &[Scene], plan: &Plan) -> Result<Foreseen> {
     let start = Instant::now();
     contender.update(Change::Volume, &scene.state)?;
     let seconds = start.elapsed().as_secs_f64() / Work::update(scene, baseline);
-    let work: f64 = scenes.iter().map(|scene| Work::of(scene, plan)).sum();
+    let work: f64 = scenes.iter().map(|scene| Work::of(gpu, scene, plan)).sum();
     let largest = scenes
         .iter()
-        .map(|scene| (VOXEL * scene.volume.len() * (group(scene) + 1).min(entries.len())) as u64);
+        .map(|scene| (VOXEL * scene.volume.len() * (group(gpu, scene) + 1).min(entries.len())) as u64);
     Ok(Foreseen { minutes: seconds * work / 60.0, device_bytes: largest.max().unwrap_or(0) })
 }
 
@@ -296,7 +301,7 @@ pub fn measure(
         );
         return Err(Error::refused("chart", problem));
     }
-    let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(scene, plan)).sum() };
+    let mut work = Work { done: 0.0, total: scenes.iter().map(|scene| Work::of(gpu, scene, plan)).sum() };
     let mut measured = Vec::new();
     for (n, scene) in scenes.iter().enumerate() {
         let mut say = |what: &str, work: &Work| progress(&format!("{}: {what}", scene.name), work.share());
@@ -344,7 +349,7 @@ impl Work {
         1e3 * 2.0 * plan.pictures.map(f64::from).iter().product::<f64>()
     }
 
-    fn of(scene: &Scene, plan: &Plan) -> f64 {
+    fn of(gpu: &Gpu, scene: &Scene, plan: &Plan) -> f64 {
         let voxel = scene.volume.min_spacing() as f32;
         let pictures =
             looks::work(voxel, &looks::settings(voxel, plan.quick), plan.runs) * Self::picture(plan);
@@ -352,7 +357,7 @@ impl Work {
         let entries = contender::all(&asked);
         let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting));
         // The baseline competes in every group.
-        let groups = (entries.len() - 1).div_ceil(group(scene)) as f64;
+        let groups = (entries.len() - 1).div_ceil(group(gpu, scene)) as f64;
         let again = baseline.map_or(0.0, |entry| (groups - 1.0) * Self::update(scene, entry));
         let updates = again + entries.iter().map(|entry| Self::update(scene, entry)).sum::<f64>();
         let changes = Change::ALL.len() as f64;
@@ -400,7 +405,7 @@ fn one(
         true => pictures::featured(std::iter::once(&baseline).chain(&entries)),
         false => Vec::new(),
     };
-    for (n, others) in entries.chunks(group(scene)).enumerate() {
+    for (n, others) in entries.chunks(group(gpu, scene)).enumerate() {
         let compete: Vec<&Entrant> = std::iter::once(&baseline).chain(others).collect();
         let found = compete_in(scene, arena, plan, &compete, &truths, &featured, work, say)?;
         // The baseline's first runs stand for it.
