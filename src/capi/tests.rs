@@ -209,6 +209,7 @@ fn declared() -> Vec<String> {
         include_str!("device.rs"),
         include_str!("draw.rs"),
         include_str!("error.rs"),
+        include_str!("features.rs"),
         include_str!("image.rs"),
         include_str!("recording.rs"),
         include_str!("renderer.rs"),
