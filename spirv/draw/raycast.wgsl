@@ -511,8 +511,8 @@ fn seen(eye: Eye, place: vec2<f32>, end: f32, featured: bool, coloured: bool) ->
             let owner = owner_of(start + t_shown * along);
             unlit = colour_by(owner);
             if params.channels == 1u {
-                // Of no feature: whatever is darkest there. With more features than channels all of them hold the same.
-                channel = select((owner.feature - 1u) % LEAST, LEAST, owner.feature == 0u);
+                // With more features than channels all of them hold the same.
+                channel = select((owner.light - 1u) % LEAST, GREATEST, owner.light == 0u);
             }
         }
         let at = Shown(

@@ -41,11 +41,18 @@ var<immediate> params: RaysParams;
 
 #include "shared/needed.wgsl"
 
-// What occlusion takes from the voxels that need a value, in FINEths of a WHOLEth.
-var<workgroup> sums: array<atomic<u32>, VOXELS>;
+// A workgroup's brick.
+struct Taken {
+    // lowest voxel
+    corner: vec3<u32>,
+    // whether there is one
+    listed: bool,
+    // no ray of it leaves the volume
+    interior: bool,
+}
 
-// One brick.
-fn work(group: vec3<u32>, lane: u32, rule: u32) {
+// Makes ready to gather its voxels, behind a barrier, which sums that were cleared before share.
+fn taken(group: vec3<u32>, lane: u32) -> Taken {
     let entry = params.base + item_of_group(group);
     let listed = entry < list.count;
     let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
@@ -53,21 +60,34 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
     for (var i = lane; i < MEANS; i += TEAM) {
         cell_means[i] = cells.mean[i];
     }
-    for (var i = lane; i < VOXELS; i += TEAM) {
-        atomicStore(&sums[i], 0u);
-    }
     workgroupBarrier();
     mark_rows(corner, lane);
     workgroupBarrier();
-    gather(corner, listed, lane);
+    let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);
+    return Taken(corner, listed, interior);
+}
+
+// What the cells along direction k stop for a voxel that needs a value, in WHOLEths of half a step.
+fn lost_along(k: u32, brick: Taken, slot: u32, rule: u32) -> u32 {
+    return WHOLE * (2u * params.cells - 1u) - traced(brick.corner + place_of(slot), brick.interior, k, rule).sum;
+}
+
+// What occlusion takes from the voxels that need a value, in FINEths of a WHOLEth.
+var<workgroup> sums: array<atomic<u32>, VOXELS>;
+
+// One brick.
+fn work(group: vec3<u32>, lane: u32, rule: u32) {
+    for (var i = lane; i < VOXELS; i += TEAM) {
+        atomicStore(&sums[i], 0u);
+    }
+    let brick = taken(group, lane);
+    gather(brick.corner, brick.listed, lane);
     workgroupBarrier();
     let count = atomicLoad(&found);
-    let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);
-    let whole = WHOLE * (2u * params.cells - 1u);
     for (var i = lane; i < count * params.directions; i += TEAM) {
         let slot = i % count;
         let k = i / count;
-        let lost = whole - traced(corner + place_of(slot), interior, k, rule).sum;
+        let lost = lost_along(k, brick, slot, rule);
         if lost > 0u {
             atomicAdd(&sums[slot], u32(f32(lost) * directions.all[k].factor));
         }
@@ -75,7 +95,7 @@ fn work(group: vec3<u32>, lane: u32, rule: u32) {
     workgroupBarrier();
     for (var i = lane; i < count; i += TEAM) {
         let value = WHOLE - ((atomicLoad(&sums[i]) + FINE / 2u) >> FINE_BITS);
-        textureStore(ambient, corner + place_of(i), vec4(f32(value) / PARTS, 0.0, 0.0, 0.0));
+        textureStore(ambient, brick.corner + place_of(i), vec4(f32(value) / PARTS, 0.0, 0.0, 0.0));
     }
 }
 
@@ -110,32 +130,21 @@ var<workgroup> coloured_sums: array<atomic<u32>, 3 * VOXELS>;
 
 // One brick, as `work`.
 fn work_coloured(group: vec3<u32>, lane: u32, rule: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    clear_needed(lane);
-    for (var i = lane; i < MEANS; i += TEAM) {
-        cell_means[i] = cells.mean[i];
-    }
     for (var i = lane; i < 3u * VOXELS; i += TEAM) {
         atomicStore(&coloured_sums[i], 0u);
     }
-    workgroupBarrier();
-    mark_rows(corner, lane);
-    workgroupBarrier();
+    let brick = taken(group, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
-        if listed && spares(corner, i) {
-            textureStore(coloured, corner + inside(i), vec4(1.0));
+        if brick.listed && spares(brick.corner, i) {
+            textureStore(coloured, brick.corner + inside(i), vec4(1.0));
         }
     }
     workgroupBarrier();
     let count = atomicLoad(&found);
-    let interior = all(corner >= params.reach) && all(corner + BRICK + params.reach <= params.dims);
-    let whole = WHOLE * (2u * params.cells - 1u);
     for (var i = lane; i < count * params.directions; i += TEAM) {
         let slot = i % count;
         let k = i / count;
-        let lost = whole - traced(corner + place_of(slot), interior, k, rule).sum;
+        let lost = lost_along(k, brick, slot, rule);
         if lost > 0u {
             let of_light = vec3<u32>(f32(lost) * tints.all[k].xyz);
             atomicAdd(&coloured_sums[slot], of_light.x);
@@ -151,7 +160,7 @@ fn work_coloured(group: vec3<u32>, lane: u32, rule: u32) {
             atomicLoad(&coloured_sums[2u * VOXELS + i]),
         );
         let value = WHOLE - ((sum + FINE / 2u) >> vec3(FINE_BITS));
-        textureStore(coloured, corner + place_of(i), vec4(vec3<f32>(value) / PARTS, 1.0));
+        textureStore(coloured, brick.corner + place_of(i), vec4(vec3<f32>(value) / PARTS, 1.0));
     }
 }
 

@@ -10,14 +10,17 @@
 // Rise a voxel below which the way out shortens, to none where there is no surface. At a wall it is 0.2 and more.
 const LEAST_RISE = 0.1;
 
-// Which channel of V_AO is read: of values of features side by side (fdao.wgsl) that of the feature of the place that is looked at, or LEAST,
-// the least of four.
+// Which channel of V_AO is read: of values of features side by side (fdao.wgsl) that of the feature of the place that is looked at; or LEAST,
+// the least of four; or GREATEST, which is 1 where there is no matter of one of four features, and of every other rule the voxel's value.
 var<private> channel = 0u;
 const LEAST = 4u;
+const GREATEST = 5u;
 
 fn channel_of(texel: vec4<f32>) -> f32 {
-    if channel == LEAST {
-        return min(min(texel.x, texel.y), min(texel.z, texel.w));
+    if channel >= LEAST {
+        let low = min(texel.xy, texel.zw);
+        let high = max(texel.xy, texel.zw);
+        return select(max(high.x, high.y), min(low.x, low.y), channel == LEAST);
     }
     return dot(texel, vec4<f32>(vec4(channel) == vec4(0u, 1u, 2u, 3u)));
 }

@@ -15,6 +15,8 @@ fn source_at(x: i32, y: i32, z: i32) -> f32 {
 // Who has the most of a place's opacity, and the eight voxels round it.
 struct Owner {
     feature: u32,
+    // the feature whose light it has: the same, or of a place of nobody's the one that has the most opacity; 0 where none has any
+    light: u32,
     // lowest and highest voxel
     l: vec3<i32>,
     h: vec3<i32>,
@@ -36,10 +38,12 @@ fn owner_of(position: vec3<f32>) -> Owner {
     let low = vec4(feature_at(l.x, l.y, l.z), feature_at(h.x, l.y, l.z), feature_at(l.x, h.y, l.z), feature_at(h.x, h.y, l.z));
     let high = vec4(feature_at(l.x, l.y, h.z), feature_at(h.x, l.y, h.z), feature_at(l.x, h.y, h.z), feature_at(h.x, h.y, h.z));
     var own = low.x;
+    var beside = 0u;
     if any(low != vec4(own)) || any(high != vec4(own)) {
         let below = (1.0 - w.z) * across * vec4(texel_at(l.x, l.y, l.z), texel_at(h.x, l.y, l.z), texel_at(l.x, h.y, l.z), texel_at(h.x, h.y, l.z));
         let above = w.z * across * vec4(texel_at(l.x, l.y, h.z), texel_at(h.x, l.y, h.z), texel_at(l.x, h.y, h.z), texel_at(h.x, h.y, h.z));
         var most = 0.0;
+        var most_beside = 0.0;
         for (var k = 0u; k <= features.count; k++) {
             if only_spared && features.each[k].spared == 0u {
                 continue;
@@ -49,9 +53,13 @@ fn owner_of(position: vec3<f32>) -> Owner {
                 most = share;
                 own = k;
             }
+            if k > 0u && share > most_beside {
+                most_beside = share;
+                beside = k;
+            }
         }
     }
-    return Owner(own, l, h, across, w.z, low, high);
+    return Owner(own, select(own, beside, own == 0u), l, h, across, w.z, low, high);
 }
 
 fn colour_by(owner: Owner) -> vec3<f32> {

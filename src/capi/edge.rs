@@ -104,6 +104,25 @@ pub(crate) unsafe fn text<'a>(what: &str, pointer: *const c_char) -> Result<&'a 
     }
 }
 
+/// As many texts, of at most `most`.
+///
+/// # Safety
+/// The pointer points to as many pointers, each as [`text`] asks.
+pub(crate) unsafe fn texts<'a>(
+    what: &str,
+    pointer: *const *const c_char,
+    count: u32,
+    most: usize,
+) -> Result<Vec<&'a str>> {
+    if count as usize > most {
+        return refuse(CaoResult::Limit, format!("{what}: {count} of them; expected at most {most}"));
+    }
+    // SAFETY: the caller's promise.
+    let all = unsafe { numbers(what, pointer, count.into()) }?;
+    // SAFETY: as above, of each.
+    all.iter().map(|one| unsafe { text(what, *one) }).collect()
+}
+
 /// Where an answer goes: refuses NULL before anything is done, and writes the answer, on failure `none`.
 ///
 /// # Safety

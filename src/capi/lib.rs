@@ -22,6 +22,7 @@ pub mod device;
 pub mod draw;
 mod edge;
 pub mod error;
+pub mod features;
 mod handle;
 pub mod image;
 pub mod recording;
@@ -34,7 +35,7 @@ mod tests;
 use std::ffi::c_char;
 
 /// Changes where functions or structs change so that a host must be compiled again.
-pub const CAO_ABI: u32 = 1;
+pub const CAO_ABI: u32 = 2;
 
 /// The CAO_ABI that the library was built with; compare it with the header's.
 // SAFETY: the name is ours alone.

@@ -2,7 +2,7 @@
 
 use crate::device::CaoDevice;
 use crate::device::vulkan::VkFormat;
-use crate::edge::{answer, numbers, one_of, read, read_all, text, versioned};
+use crate::edge::{answer, numbers, one_of, read, read_all, text, texts, versioned};
 use crate::error::{CaoResult, Result, guard, refuse};
 use crate::handle::{free, get, handle, insert};
 use crate::image::format;
@@ -11,6 +11,7 @@ use cao::Renderer;
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::methods::Method;
 use cao_model::occlusion::RaySet;
+use cao_model::options::KEYS;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use glam::Vec3;
@@ -33,12 +34,18 @@ pub(crate) struct Shared {
     /// Commands that it takes as done will never run.
     pub stale: Arc<AtomicBool>,
     range: (f64, f64),
-    spacing: f64,
+    /// Voxels along x, y, z, and their distances in mm.
+    pub dims: [usize; 3],
+    pub spacing: [f64; 3],
     /// The handle's number of the device that it is on.
     pub device: u64,
 }
 
 impl Shared {
+    fn min_spacing(&self) -> f64 {
+        self.spacing.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
     /// Runs a call, unless another thread is in one.
     pub fn enter<R>(&self, call: impl FnOnce(&mut Renderer) -> Result<R>) -> Result<R> {
         let mut renderer = match self.renderer.try_lock() {
@@ -70,9 +77,34 @@ pub enum CaoMethod {
     Cao = 1,
     /// Local ambient occlusion: every voxel at every change.
     Lao = 2,
+    /// The mean opacity of a box around each voxel.
+    Sat = 3,
+    /// Shells of such boxes. Option shells.
+    Shells = 4,
+    /// Vicinity shading.
+    Vicinity = 5,
+    /// Clustered local histograms; does not see clips. Options clusters, bleeding.
+    Histograms = 6,
+    /// Feature-driven: each feature is occluded by its own matter alone. Option combine.
+    FeatureDriven = 7,
+    /// Smooth probabilistic ambient occlusion. Options levels, normal.
+    Spao = 8,
+    /// Cone tracing.
+    Cones = 9,
 }
 
-const METHODS: [Method; 3] = [Method::Rays, Method::Cao, Method::Lao];
+pub(crate) const METHODS: [Method; 10] = [
+    Method::Rays,
+    Method::Cao,
+    Method::Lao,
+    Method::Sat,
+    Method::Shells,
+    Method::Vicinity,
+    Method::Histograms,
+    Method::FeatureDriven,
+    Method::Spao,
+    Method::Cones,
+];
 
 /// How occlusion is computed. All but the size 0 is the default.
 #[repr(C)]
@@ -84,8 +116,15 @@ pub struct CaoSetup {
     pub method: u32,
     /// How far occlusion reaches in mm; 0: 20 voxels of the smallest spacing.
     pub radius_mm: f32,
-    /// Directions a voxel: of rays an even number up to 254, of the others 6, 14, 26 or 54; 0: the method's own, 50 or 26.
+    /// Directions a voxel: of rays and of feature-driven an even number up to 254, of CAO's and LAO's 6, 14, 26, 50 or 54, of vicinity's 26, 50
+    /// or 96, of cones 14 or 26, and 0 of those that follow none; 0: the method's own.
     pub directions: u32,
+    /// Options of the method, each as NAME=VALUE, as in `combine=max`; NULL where there are none.
+    pub options: *const *const c_char,
+    /// As many.
+    pub option_count: u32,
+    /// 0.
+    pub reserved: u32,
 }
 versioned!(CaoSetup);
 
@@ -180,16 +219,52 @@ pub struct CaoClip {
 }
 versioned!(CaoClip);
 
-fn setup(given: &CaoSetup, spacing: f64) -> Result<Setup> {
+/// The rays of a method that are so many.
+fn rays(method: Method, count: u32) -> Result<RaySet> {
+    if let RaySet::Spiral(_) = method.rays() {
+        return Ok(RaySet::parse(&format!("spiral:{count}"))?);
+    }
+    let sets = method.entry().sets.iter().filter(|set| **set != RaySet::None);
+    if let Some(set) = sets.clone().find(|set| set.count() == count as usize) {
+        return Ok(*set);
+    }
+    let allowed: Vec<_> = sets.map(|set| set.count().to_string()).collect();
+    let what =
+        format!("CaoSetup.directions: {count}; expected of method {} 0 {}", method.name(), allowed.join(" "));
+    refuse(CaoResult::BadValue, what)
+}
+
+/// # Safety
+/// The pointers are as the header asks.
+unsafe fn setup(given: &CaoSetup, spacing: f64) -> Result<Setup> {
     let mut setup = Setup::of(one_of("CaoSetup.method", given.method, &METHODS)?, spacing);
     if given.radius_mm != 0.0 {
         setup.occlusion.radius_mm = given.radius_mm;
     }
     if given.directions != 0 {
-        let prefix = if setup.method == Method::Rays { "spiral:" } else { "" };
-        setup.occlusion.rays = RaySet::parse(&format!("{prefix}{}", given.directions))?;
+        setup.occlusion.rays = rays(setup.method, given.directions)?;
+    }
+    // SAFETY: the caller's promise.
+    for option in unsafe { texts("CaoSetup.options", given.options, given.option_count, KEYS.len()) }? {
+        let Some((name, value)) = option.split_once('=') else {
+            let what = format!("CaoSetup.options: {option:?}; expected NAME=VALUE");
+            return refuse(CaoResult::BadValue, what);
+        };
+        setup.options.set(name, value)?;
     }
     Ok(setup)
+}
+
+/// The default where the pointer is NULL.
+///
+/// # Safety
+/// As [`setup`].
+unsafe fn setup_or_default(given: *const CaoSetup, spacing: f64) -> Result<Setup> {
+    if given.is_null() {
+        return Ok(Setup::new(spacing));
+    }
+    // SAFETY: the caller's promise.
+    unsafe { setup(&read(given)?, spacing) }
 }
 
 fn clip(given: &CaoClip) -> Result<Clip> {
@@ -226,17 +301,14 @@ pub unsafe extern "C" fn cao_renderer_create(
             false => unsafe { text("CaoRendererInfo.preset", info.preset) }?,
         };
         let (gpu, volume) = (get(info.device)?, get(info.volume)?);
-        let (range, spacing) = (volume.range(), volume.min_spacing());
-        let setup = match info.setup.is_null() {
-            true => Setup::new(spacing),
-            // SAFETY: the header asks for it.
-            false => setup(&unsafe { read(info.setup) }?, spacing)?,
-        };
+        let (range, dims, spacing) = (volume.range(), volume.dims, volume.spacing);
+        // SAFETY: the header asks for it.
+        let setup = unsafe { setup_or_default(info.setup, volume.min_spacing()) }?;
         let colour = format(info.colour_format)?;
         let transfer = TransferFunction::preset(preset, range)?;
         let renderer = Mutex::new(Renderer::new(&gpu, &volume, transfer, setup, colour)?);
         let device = info.device.id;
-        Ok(insert(Shared { renderer, stale: Arc::default(), range, spacing, device }, device))
+        Ok(insert(Shared { renderer, stale: Arc::default(), range, dims, spacing, device }, device))
     };
     // SAFETY: the header asks for it.
     guard(|| unsafe { answer(renderer, CaoRenderer { id: 0 }, make) })
@@ -286,7 +358,8 @@ pub unsafe extern "C" fn cao_renderer_set_transfer(
     })
 }
 
-/// Changes how occlusion is computed. Uses the lent queue where the method is another. NULL is the default.
+/// Changes how occlusion is computed; the ambient light stays, and a method that does not follow it is refused. Uses the lent queue where
+/// the method is another. NULL is the default.
 // SAFETY: the name is ours alone; pointers are as the header asks.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn cao_renderer_set_setup(
@@ -295,12 +368,12 @@ pub unsafe extern "C" fn cao_renderer_set_setup(
 ) -> CaoResult {
     guard(|| {
         let shared = get(renderer)?;
-        let setup = match setup_info.is_null() {
-            true => Setup::new(shared.spacing),
-            // SAFETY: the header asks for it.
-            false => setup(&unsafe { read(setup_info) }?, shared.spacing)?,
-        };
-        shared.enter(|renderer| Ok(renderer.set_setup(setup)?))
+        // SAFETY: the header asks for it.
+        let mut setup = unsafe { setup_or_default(setup_info, shared.min_spacing()) }?;
+        shared.enter(|renderer| {
+            setup.occlusion.light = renderer.setup().occlusion.light;
+            Ok(renderer.set_setup(setup)?)
+        })
     })
 }
 

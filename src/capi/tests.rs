@@ -202,6 +202,17 @@ fn numbers_of_shapes_are_those_of_the_header() {
     assert_eq!(Mesh as usize, Shape::ANALYTIC.len());
 }
 
+#[test]
+fn numbers_of_methods_are_those_of_the_header() {
+    use CaoMethod::{Cao, Cones, FeatureDriven, Histograms, Lao, Rays, Sat, Shells, Spao, Vicinity};
+    let numbers = [Rays, Cao, Lao, Sat, Shells, Vicinity, Histograms, FeatureDriven, Spao, Cones];
+    let names = ["rays", "cao", "lao", "sat", "shells", "vicinity", "histograms", "fdao", "spao", "cones"];
+    for (number, name) in numbers.into_iter().zip(names) {
+        assert_eq!(METHODS[number as usize].name(), name);
+    }
+    assert_eq!((METHODS.len(), numbers.len()), (cao_model::methods::METHODS.len(), names.len()));
+}
+
 /// Names of functions, fields and values in the Rust files.
 fn declared() -> Vec<String> {
     let files = [
@@ -209,6 +220,7 @@ fn declared() -> Vec<String> {
         include_str!("device.rs"),
         include_str!("draw.rs"),
         include_str!("error.rs"),
+        include_str!("features.rs"),
         include_str!("image.rs"),
         include_str!("recording.rs"),
         include_str!("renderer.rs"),

@@ -130,6 +130,27 @@ pub unsafe extern "C" fn cao_volume_from_memory(
     guard(|| unsafe { answer(volume, CaoVolume { id: 0 }, make) })
 }
 
+/// What belongs to each label of a volume of such voxels on this grid, for each voxel.
+pub(crate) fn of_labels(
+    labels: &Volume,
+    dims: [usize; 3],
+    spacing: [f64; 3],
+    each: &[u8],
+) -> Result<Vec<u8>> {
+    if labels.dims != dims || labels.spacing != spacing {
+        let (found, apart) = (labels.dims, labels.spacing);
+        let what = format!(
+            "labels: {found:?} voxels, {apart:?} mm apart; expected those of the volume, {dims:?}, {spacing:?} mm"
+        );
+        return refuse(CaoResult::BadValue, what);
+    }
+    match &labels.values {
+        Values::U8(all) => Ok(all.iter().map(|label| each[usize::from(*label)]).collect()),
+        Values::U16(all) => Ok(all.iter().map(|label| each[usize::from(*label)]).collect()),
+        _ => refuse(CaoResult::BadValue, "labels: expected voxels of CAO_VOXEL_U8 or CAO_VOXEL_U16"),
+    }
+}
+
 /// Frees a volume.
 // SAFETY: the name is ours alone.
 #[unsafe(no_mangle)]

@@ -78,9 +78,9 @@ fn twin(
     let ambient = renderer.ambient().fields().ambient;
     let channels = (ambient.desc().format == Format::Rgba16Unorm).then(|| {
         let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read_image(renderer.gpu(), ambient));
-        let least = |texel: &[u16; 4]| *texel.iter().min().unwrap();
+        let greatest = |texel: &[u16; 4]| *texel.iter().max().unwrap();
         std::array::from_fn(|c| {
-            let of = |texel: &[u16; 4]| f32::from(if c < 4 { texel[c] } else { least(texel) }) / 65535.0;
+            let of = |texel: &[u16; 4]| f32::from(if c < 4 { texel[c] } else { greatest(texel) }) / 65535.0;
             texels.iter().map(of).collect()
         })
     });
@@ -145,21 +145,32 @@ fn pictures_of_features_are_those_of_the_twin() {
         let list = list.into_iter().chain([third]).collect();
         Features::by_labels(list, volume.dims, (0..grid.len()).map(of).collect()).unwrap()
     };
+    // Every third stripe is nobody's, between two features.
+    let stripes = {
+        let grid = grid_of(&volume);
+        let of = |i| (grid.voxel(i)[0] / 2 % 3) as u8;
+        let list = vec![coloured("a", [0.9; 3]), coloured("b", [0.9; 3])];
+        Features::by_labels(list, volume.dims, (0..grid.len()).map(of).collect()).unwrap()
+    };
     for (n, (method, features, clips)) in [
         (Method::Cao, layers(), vec![]),
         (Method::Cao, layers(), vec![ball.clone()]),
         (Method::Cao, labels, vec![ball.clone(), slab]),
         // Which reads the factor of the feature that it shows.
         (Method::FeatureDriven, layers(), vec![ball]),
+        (Method::FeatureDriven, stripes, vec![]),
     ]
     .iter()
     .enumerate()
     {
         let renderer = renderer_by(*method, &gpu, &volume, &transfer, features, clips);
         for turn in 0..2 {
+            // Twice over, as others are shown, most of what features leave of their own light is all of it.
+            let gain = if *method == Method::FeatureDriven { 1.0 } else { Look::default().gain };
             let look = Look {
                 step_mm: Some([0.5, 0.35][turn]),
                 shading: [Shading::PhongAo, Shading::Phong][turn],
+                gain,
                 ..Look::default()
             };
             let views = framing(&volume, -30.0 + 70.0 * (turn + n) as f32, 35.0 - 20.0 * turn as f32);

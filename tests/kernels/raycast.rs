@@ -236,8 +236,9 @@ fn pictures_in_coloured_light_are_those_of_the_twin() {
     };
     let volume =
         Volume::new(grid.dims, grid.spacing, Values::U8((0..grid.len()).map(ball).collect())).unwrap();
+    // What is lit lies most of a voxel out of the ball, so that most of what stands for its air is risen.
     let transfer =
-        TransferFunction::new(vec![[80.0, 0.0], [120.0, 0.9]], vec![[0.0, 0.9, 0.9, 0.9]], None).unwrap();
+        TransferFunction::new(vec![[10.0, 0.0], [40.0, 0.9]], vec![[0.0, 0.9, 0.9, 0.9]], None).unwrap();
     let clip = Clip {
         shape: Shape::Sphere,
         mode: Mode::Remove,

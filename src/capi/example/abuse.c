@@ -245,7 +245,7 @@ static CaoImageInfo image_info(CaoDevice device, const HostImage *image)
 static void settings(CaoDevice device, CaoVolume volume, CaoRenderer renderer)
 {
     CaoRenderer none;
-    CaoSetup setup = {.size = sizeof setup, .method = 3};
+    CaoSetup setup = {.size = sizeof setup, .method = 10};
     CaoRendererInfo info = {
         .size = sizeof info, .colour_format = VK_FORMAT_R8G8B8A8_UNORM, .device = device, .volume = volume, .setup = &setup};
     REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_create(&info, &none));
@@ -300,6 +300,82 @@ static void settings(CaoDevice device, CaoVolume volume, CaoRenderer renderer)
     REFUSED(CAO_RESULT_NULL_POINTER, cao_look_default(NULL));
     CaoLook look = {.size = 3};
     REFUSED(CAO_RESULT_WRONG_SIZE, cao_look_default(&look));
+}
+
+static void parts(CaoDevice device, CaoVolume volume, CaoRenderer renderer)
+{
+    const CaoVolume none = {0};
+    CaoFeature two[2] = {
+        {.size = sizeof two[0], .visible = 1, .opacity = 1, .values = {0, 10}},
+        {.size = sizeof two[1], .visible = 1, .opacity = 1, .values = {10, 20}},
+    };
+    REFUSED(CAO_RESULT_NULL_POINTER, cao_renderer_set_features(renderer, NULL, 1, none));
+    REFUSED(CAO_RESULT_LIMIT, cao_renderer_set_features(renderer, two, 9, none));
+    REFUSED(CAO_RESULT_BAD_HANDLE, cao_renderer_set_features(renderer, two, 2, (CaoVolume){device.id}));
+    two[1].size--;
+    REFUSED(CAO_RESULT_WRONG_SIZE, cao_renderer_set_features(renderer, two, 2, none));
+    two[1].size++;
+    two[1].values[0] = 9;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 2, none));
+    two[1].opacity = NAN;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 2, volume));
+    two[1].opacity = 1;
+    two[0].label_count = 1;
+    REFUSED(CAO_RESULT_NULL_POINTER, cao_renderer_set_features(renderer, two, 2, volume));
+    uint32_t label = 65536;
+    two[0].labels = &label;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 2, volume));
+    label = 3;
+    two[1].label_count = 1;
+    two[1].labels = &label;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 2, volume));
+    /* Of another grid, and of another type. */
+    CaoVolumeInfo info = volume_info();
+    info.dims[0] = SIZE / 2;
+    info.dims[1] = 2 * SIZE;
+    CaoVolume labels;
+    FINE(cao_volume_from_memory(&info, &labels));
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 1, labels));
+    FINE(cao_volume_free(labels));
+    REFUSED(CAO_RESULT_FREED, cao_renderer_set_features(renderer, two, 1, labels));
+    float *values = calloc(SIZE * SIZE * SIZE, sizeof *values);
+    info = volume_info();
+    info.voxel = CAO_VOXEL_F32;
+    info.data = values;
+    info.bytes = SIZE * SIZE * SIZE * sizeof *values;
+    FINE(cao_volume_from_memory(&info, &labels));
+    free(values);
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_features(renderer, two, 1, labels));
+    FINE(cao_volume_free(labels));
+
+    CaoAmbientLight light = {.size = sizeof light, .kind = 3};
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_ambient_light(renderer, &light));
+    light.kind = CAO_LIGHT_KIND_SKY;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_ambient_light(renderer, &light));
+    light.kind = CAO_LIGHT_KIND_HARMONICS;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_ambient_light(renderer, &light));
+    light.coefficient_count = 10;
+    REFUSED(CAO_RESULT_LIMIT, cao_renderer_set_ambient_light(renderer, &light));
+    light.coefficient_count = 1;
+    REFUSED(CAO_RESULT_NULL_POINTER, cao_renderer_set_ambient_light(renderer, &light));
+    double dark[3] = {1, 1, -1};
+    light.coefficients = dark;
+    REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_ambient_light(renderer, &light));
+    light.size = 0;
+    REFUSED(CAO_RESULT_WRONG_SIZE, cao_renderer_set_ambient_light(renderer, &light));
+
+    const char *options[] = {"levels=mip", "levels", "normal=7", "shells=4", NULL};
+    CaoSetup setup = {.size = sizeof setup, .method = CAO_METHOD_SPAO, .options = options, .option_count = 2};
+    for (int i = 0; i < 3; i++) {
+        REFUSED(CAO_RESULT_BAD_VALUE, cao_renderer_set_setup(renderer, &setup));
+        options[1] = options[2 + i];
+    }
+    REFUSED(CAO_RESULT_NULL_POINTER, cao_renderer_set_setup(renderer, &setup));
+    setup.option_count = UINT32_MAX;
+    REFUSED(CAO_RESULT_LIMIT, cao_renderer_set_setup(renderer, &setup));
+    setup.options = NULL;
+    setup.option_count = 1;
+    REFUSED(CAO_RESULT_NULL_POINTER, cao_renderer_set_setup(renderer, &setup));
 }
 
 static void images(CaoDevice device, const HostImage *image)
@@ -509,6 +585,7 @@ static void with_device(void)
     FINE(cao_renderer_create(&create, &renderer));
     HostImage image = host_image(&host, SIZE, SIZE, 1);
     settings(device, volume, renderer);
+    parts(device, volume, renderer);
     images(device, &image);
     recordings(&host, device, renderer, &image);
     two_threads(renderer);

@@ -214,6 +214,7 @@ static int check(const HostImage *image, const char *what, Box visible)
     return wrong == 0 && clear > 100 && full > 100 ? 0 : 1;
 }
 
+/* The sum of its red. */
 static double light(const HostImage *image)
 {
     double sum = 0.0;
@@ -235,6 +236,25 @@ static CaoMesh beam(void)
     CaoMesh mesh;
     CAO(cao_mesh_from_memory(vertices, 8, indices, 36, &mesh));
     return mesh;
+}
+
+/* The left half of the block as labels 300, the right half 7. */
+static CaoVolume halves(void)
+{
+    static uint16_t labels[N * N * N];
+    for (int i = 0; i < N * N * N; i++)
+        labels[i] = i % N < N / 2 ? 300 : 7;
+    CaoVolumeInfo info = {
+        .size = sizeof info,
+        .voxel = CAO_VOXEL_U16,
+        .dims = {N, N, N},
+        .spacing_mm = {1.0, 1.0, 1.0},
+        .data = labels,
+        .bytes = sizeof labels,
+    };
+    CaoVolume volume;
+    CAO(cao_volume_from_memory(&info, &volume));
+    return volume;
 }
 
 int main(void)
@@ -261,6 +281,45 @@ int main(void)
     double dim = light(&image);
     printf("%-28s %.0f %% of the light\n", "with ambient occlusion", 100.0 * dim / bright);
     failed += !(dim < 0.95 * bright && dim > 0.1 * bright);
+
+    /* From above, the eyes' side, all of the light reaches what they see; the first harmonic alone is the same from everywhere. */
+    CaoAmbientLight sky = {.size = sizeof sky, .kind = CAO_LIGHT_KIND_SKY, .up = {0.0, 0.0, 2.0}};
+    CAO(cao_renderer_set_ambient_light(renderer, &sky));
+    frame(&host, device, renderer, &image, lent, CAO_SHADING_AO);
+    double above = light(&image);
+    double one[3] = {1.0, 1.0, 1.0};
+    CaoAmbientLight even = {
+        .size = sizeof even, .kind = CAO_LIGHT_KIND_HARMONICS, .coefficients = one, .coefficient_count = 1};
+    CAO(cao_renderer_set_ambient_light(renderer, &even));
+    frame(&host, device, renderer, &image, lent, CAO_SHADING_AO);
+    double same = light(&image);
+    printf("%-28s %.0f %% from above, %.0f %% of a harmonic\n", "of this light", 100.0 * above / dim, 100.0 * same / dim);
+    failed += !(above > 1.03 * dim && fabs(same - dim) < 0.01 * dim);
+    CAO(cao_renderer_set_ambient_light(renderer, NULL));
+
+    /* Features by labels, of which one is hidden, by another method; then one by values that is blue. */
+    const char *options[] = {"combine=max"};
+    CaoSetup by_features = {
+        .size = sizeof by_features, .method = CAO_METHOD_FEATURE_DRIVEN, .radius_mm = 4.0f, .options = options, .option_count = 1};
+    CAO(cao_renderer_set_setup(renderer, &by_features));
+    uint32_t left_label = 300, right_label = 7;
+    CaoFeature features[2] = {
+        {.size = sizeof features[0], .visible = 0, .opacity = 1.0f, .label_count = 1, .labels = &left_label},
+        {.size = sizeof features[1], .visible = 1, .opacity = 1.0f, .label_count = 1, .labels = &right_label},
+    };
+    CaoVolume labels = halves();
+    CAO(cao_renderer_set_features(renderer, features, 2, labels));
+    CAO(cao_volume_free(labels));
+    frame(&host, device, renderer, &image, lent, CAO_SHADING_NONE);
+    Box right = all;
+    right.low[0] = 0.0;
+    failed += check(&image, "with a hidden feature", right);
+    CaoFeature blue = {
+        .size = sizeof blue, .visible = 1, .opacity = 1.0f, .has_colour = 1, .colour = {0.0f, 0.0f, 1.0f}, .values = {500.0f, 2000.0f}};
+    CAO(cao_renderer_set_features(renderer, &blue, 1, (CaoVolume){0}));
+    frame(&host, device, renderer, &image, lent, CAO_SHADING_NONE);
+    failed += check(&image, "a blue feature", all) + (light(&image) != 0.0);
+    CAO(cao_renderer_set_features(renderer, NULL, 0, (CaoVolume){0}));
 
     /* The half-space z > 0 of a clip, turned so that it is x > 0, removes what is to the right of it. */
     for (int step = 0; step < 3; step++) {

@@ -21,7 +21,7 @@
 #include <vulkan/vulkan_core.h>
 
 // Changes where functions or structs change so that a host must be compiled again.
-#define CAO_ABI 1
+#define CAO_ABI 2
 
 // What a function answers. Where it is not CAO_RESULT_OK nothing was done, what it would have given is 0, and cao_last_error says why.
 enum CaoResult
@@ -103,6 +103,20 @@ enum CaoMethod
     CAO_METHOD_CAO = 1,
     // Local ambient occlusion: every voxel at every change.
     CAO_METHOD_LAO = 2,
+    // The mean opacity of a box around each voxel.
+    CAO_METHOD_SAT = 3,
+    // Shells of such boxes. Option shells.
+    CAO_METHOD_SHELLS = 4,
+    // Vicinity shading.
+    CAO_METHOD_VICINITY = 5,
+    // Clustered local histograms; does not see clips. Options clusters, bleeding.
+    CAO_METHOD_HISTOGRAMS = 6,
+    // Feature-driven: each feature is occluded by its own matter alone. Option combine.
+    CAO_METHOD_FEATURE_DRIVEN = 7,
+    // Smooth probabilistic ambient occlusion. Options levels, normal.
+    CAO_METHOD_SPAO = 8,
+    // Cone tracing.
+    CAO_METHOD_CONES = 9,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -157,6 +171,27 @@ enum CaoSide
 typedef enum CaoSide CaoSide;
 #else
 typedef uint32_t CaoSide;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Where ambient light comes from.
+enum CaoLightKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // The same from everywhere; the default.
+    CAO_LIGHT_KIND_UNIFORM = 0,
+    // As a sky's: the cosine to a direction.
+    CAO_LIGHT_KIND_SKY = 1,
+    // Spherical harmonics.
+    CAO_LIGHT_KIND_HARMONICS = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum CaoLightKind CaoLightKind;
+#else
+typedef uint32_t CaoLightKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -294,6 +329,58 @@ typedef struct {
 // told again. Nothing may be thrown out of it.
 typedef void (*CaoErrorCallback)(CaoResult result, const char *message, void *user);
 
+// A volume on a device. 0 is none.
+typedef struct {
+    // Without meaning for a host.
+    uint64_t id;
+} CaoRenderer;
+
+// A part of a volume. Features are called by their numbers, "1" the first.
+typedef struct {
+    // sizeof(CaoFeature).
+    uint32_t size;
+    // Whether it shows: 0 or 1.
+    uint32_t visible;
+    // What its opacities are multiplied with, 0 … 16; they end at 1.
+    float opacity;
+    // Whether clips leave it whole: 0 or 1.
+    uint32_t spared;
+    // Whether it has a colour of its own, 0 or 1; else it has the transfer function's.
+    uint32_t has_colour;
+    // Red, green, blue; linear, 0 … 1.
+    float colour[3];
+    // Without labels: its voxels' values are from the first number on and below the second. Intervals lie apart.
+    float values[2];
+    // With labels: how many it has,
+    uint32_t label_count;
+    // 0.
+    uint32_t reserved;
+    // and which; each belongs to one feature.
+    const uint32_t *labels;
+} CaoFeature;
+
+// A volume in memory, on no device. 0 is none.
+typedef struct {
+    // Without meaning for a host.
+    uint64_t id;
+} CaoVolume;
+
+// Ambient light by the direction that it comes from, along the volume's axes (docs/method.md, 2.1).
+typedef struct {
+    // sizeof(CaoAmbientLight).
+    uint32_t size;
+    // A CaoLightKind.
+    uint32_t kind;
+    // Of a sky: the direction that is up, of any length.
+    double up[3];
+    // Of harmonics: three doubles each, red, green and blue, in the order 1, y, z, x, xy, yz, 3z² - 1, xz, x² - y².
+    const double *coefficients;
+    // Of harmonics: how many, 1 … 9; the others are 0.
+    uint32_t coefficient_count;
+    // 0.
+    uint32_t reserved;
+} CaoAmbientLight;
+
 // One side of a barrier: how a host leaves an image, or wants it.
 typedef struct {
     // Stages that touched it last, or touch it next.
@@ -342,12 +429,6 @@ typedef struct {
     // Without meaning for a host.
     uint64_t id;
 } CaoRecording;
-
-// A volume on a device. 0 is none.
-typedef struct {
-    // Without meaning for a host.
-    uint64_t id;
-} CaoRenderer;
 
 // An eye, as OpenXR gives it, in mm in the volume's frame.
 typedef struct {
@@ -423,12 +504,6 @@ typedef struct {
     uint32_t coding;
 } CaoDraw;
 
-// A volume in memory, on no device. 0 is none.
-typedef struct {
-    // Without meaning for a host.
-    uint64_t id;
-} CaoVolume;
-
 // How occlusion is computed. All but the size 0 is the default.
 typedef struct {
     // sizeof(CaoSetup).
@@ -437,8 +512,15 @@ typedef struct {
     uint32_t method;
     // How far occlusion reaches in mm; 0: 20 voxels of the smallest spacing.
     float radius_mm;
-    // Directions a voxel: of rays an even number up to 254, of the others 6, 14, 26 or 54; 0: the method's own, 50 or 26.
+    // Directions a voxel: of rays and of feature-driven an even number up to 254, of CAO's and LAO's 6, 14, 26, 50 or 54, of vicinity's 26, 50
+    // or 96, of cones 14 or 26, and 0 of those that follow none; 0: the method's own.
     uint32_t directions;
+    // Options of the method, each as NAME=VALUE, as in `combine=max`; NULL where there are none.
+    const char *const *options;
+    // As many.
+    uint32_t option_count;
+    // 0.
+    uint32_t reserved;
 } CaoSetup;
 
 // What a renderer is made of.
@@ -550,6 +632,19 @@ const char *cao_last_error(void);
 // `user` is handed to it as it is; any thread may have it.
 CaoResult cao_set_error_callback(CaoErrorCallback callback, void *user);
 
+// Changes the features, all of them, at most 8; 0 and NULL for none. Voxels belong to them by their values where `labels` is 0, else by a
+// volume of CAO_VOXEL_U8 or CAO_VOXEL_U16 on the renderer's grid, which may be freed afterwards; those with no feature's label are of
+// none. How features are shown never uses a queue; other voxels use the lent queue and wait for it.
+CaoResult cao_renderer_set_features(CaoRenderer renderer,
+                                    const CaoFeature *features,
+                                    uint32_t feature_count,
+                                    CaoVolume labels);
+
+// Changes the ambient light; NULL is uniform. Of CAO_METHOD_RAYS all, of CAO_METHOD_CAO and CAO_METHOD_LAO light of one colour; other
+// methods have uniform light only. Uses the lent queue where light becomes coloured or ceases to be.
+CaoResult cao_renderer_set_ambient_light(CaoRenderer renderer,
+                                         const CaoAmbientLight *light);
+
 // Lends an image, for as many recordings as wanted, between cao_recording_acquire and cao_recording_release. Free it with cao_image_free
 // before the host destroys it.
 CaoResult cao_image_adopt(const CaoImageInfo *info,
@@ -603,8 +698,10 @@ CaoResult cao_renderer_set_preset(CaoRenderer renderer, const char *preset);
 // Changes the transfer function to points of the host's own.
 CaoResult cao_renderer_set_transfer(CaoRenderer renderer, const CaoTransfer *transfer);
 
-// Changes how occlusion is computed. Uses the lent queue where the method is another. NULL is the default.
-CaoResult cao_renderer_set_setup(CaoRenderer renderer, const CaoSetup *setup_info);
+// Changes how occlusion is computed; the ambient light stays, and a method that does not follow it is refused. Uses the lent queue where
+// the method is another. NULL is the default.
+CaoResult cao_renderer_set_setup(CaoRenderer renderer,
+                                 const CaoSetup *setup_info);
 
 // Changes the clips, all of them, at most 8; 0 and NULL for none. Never uses a queue: maps of meshes are made by the next update.
 CaoResult cao_renderer_set_clips(CaoRenderer renderer, const CaoClip *clips, uint32_t clip_count);

@@ -14,7 +14,7 @@
 
 use crate::clip::clips::{ClipField, visible};
 use crate::draw::air::{air_of, ambient_at, coloured_ambient_at};
-use crate::draw::feature_colour::{Parts, colour_at, owner_at};
+use crate::draw::feature_colour::{Parts, colour_at, light_at};
 use crate::draw::segment::{Segment, segment, varies};
 use crate::draw::shading::{Shown, shaded};
 use crate::{Grid, each, trilinear_clamped};
@@ -73,7 +73,7 @@ pub fn raycast(frame: &Frame, view: &View, size: [usize; 2]) -> Image {
         let values = channels.map_or(frame.ambient, |(parts, channels)| {
             let place = Vec3::from_array(frame.grid.to_world(position).map(|c| c as f32));
             let voxels = if visible(frame.clips, place) { frame.values } else { parts.spared };
-            let feature = owner_at(&frame.grid, &parts, voxels, position);
+            let feature = light_at(&frame.grid, &parts, voxels, position);
             &channels[feature.checked_sub(1).map_or(4, |channel| channel % 4)]
         });
         ambient_at(&frame.grid, values, position)
