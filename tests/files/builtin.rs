@@ -64,7 +64,7 @@ const FINGERPRINTS: [u64; 5] = [
     0xfc61_53bd_80a4_1109,
     0x9350_ac4e_4912_d71d,
     0x825a_3eb7_915e_e298,
-    0x0000_0000_0000_0000,
+    0x7e21_7cff_418b_a12f,
 ];
 
 #[test]

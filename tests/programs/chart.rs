@@ -140,7 +140,7 @@ fn the_papers_scenes_have_their_shares_tables_and_pictures() {
 #[test]
 fn the_paper_of_features_has_its_tables_and_pictures() {
     let gpu = open();
-    let plan = features::Plan { edge: 16, radius: 4, runs: 1, size: 48 };
+    let plan = features::Plan { edge: 16, radius: 4, shown: 4, runs: 1, size: 48 };
     let found = features::measure(&gpu, &plan, &mut |_, share| assert!(share <= 1.0)).unwrap();
     close(gpu);
     assert_eq!(found.scenes.iter().map(|s| s.features.len()).collect::<Vec<_>>(), [5, 3, 2]);

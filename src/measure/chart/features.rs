@@ -28,8 +28,10 @@ use cao_model::volume::Volume;
 pub struct Plan {
     /// Voxels along each axis.
     pub edge: usize,
-    /// R in voxels.
+    /// R in voxels of what is timed.
     pub radius: u32,
+    /// R in voxels of pictures.
+    pub shown: u32,
     /// Timed runs of each setting.
     pub runs: u32,
     /// Pixels of a picture along each axis.
@@ -37,20 +39,21 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// What a device can do: the printed radius on a GPU, half of it in small volumes on a software driver; smaller ones for a first look.
+    /// What a device can do: the paper's R in volumes of its head's size on a GPU, of a 64th of that on a software driver; less for a first
+    /// look. Rays of pictures are a quarter of the edge long: in large volumes layers are many voxels thick, and shorter ones do not leave them.
     pub fn of(gpu: &Gpu, quick: bool, runs: u32) -> Self {
         let software = gpu.info().kind == DeviceKind::Cpu;
         let (edge, radius, size) = match (quick, software) {
-            (true, _) => (24, 6, 96),
-            (_, true) => (32, 8, 256),
+            (true, _) => (32, 8, 192),
+            (_, true) => (64, 16, 256),
             _ => (256, 16, 512),
         };
-        Self { edge, radius, runs, size }
+        Self { edge, radius, shown: edge as u32 / 4, runs, size }
     }
 
     /// R in voxels of Fig. 4: half, the same, twice.
     pub fn radii(&self) -> [u32; 3] {
-        [self.radius / 2, self.radius, 2 * self.radius]
+        [self.shown / 2, self.shown, 2 * self.shown]
     }
 }
 
@@ -71,11 +74,11 @@ const SCENES: [Built; 3] = [
         printed_as: "Bucky Ball",
         printed: [237.0, 912.0],
         features: &[
-            ("haze", 20.0, 0.03, [0.20, 0.35, 0.80]),
-            ("cage", 60.0, 0.06, [0.15, 0.65, 0.60]),
-            ("bonds", 100.0, 0.12, [0.55, 0.75, 0.20]),
-            ("balls", 145.0, 0.25, [0.90, 0.60, 0.15]),
-            ("cores", 200.0, 0.90, [0.85, 0.20, 0.15]),
+            ("haze", 20.0, 0.08, [0.20, 0.35, 0.80]),
+            ("cage", 60.0, 0.12, [0.15, 0.65, 0.60]),
+            ("bonds", 100.0, 0.25, [0.55, 0.75, 0.20]),
+            ("balls", 145.0, 0.40, [0.90, 0.60, 0.15]),
+            ("cores", 200.0, 0.95, [0.85, 0.20, 0.15]),
         ],
     },
     Built {
@@ -83,9 +86,9 @@ const SCENES: [Built; 3] = [
         printed_as: "Human Head",
         printed: [1339.0, 3282.0],
         features: &[
-            ("skin", -500.0, 0.04, [0.80, 0.55, 0.40]),
-            ("flesh", -60.0, 0.08, [0.75, 0.25, 0.20]),
-            ("bones", 250.0, 0.90, [0.88, 0.85, 0.75]),
+            ("skin", -500.0, 0.12, [0.80, 0.55, 0.40]),
+            ("flesh", -60.0, 0.14, [0.75, 0.25, 0.20]),
+            ("bones", 250.0, 0.95, [0.88, 0.85, 0.75]),
         ],
     },
     Built {
@@ -93,8 +96,8 @@ const SCENES: [Built; 3] = [
         printed_as: "CT Knee",
         printed: [2437.0, 4049.0],
         features: &[
-            ("block", 40.0, 0.08, [0.55, 0.60, 0.70]),
-            ("liners and valves", 130.0, 0.90, [0.85, 0.55, 0.15]),
+            ("block", 40.0, 0.12, [0.55, 0.60, 0.70]),
+            ("liners and valves", 130.0, 0.95, [0.85, 0.55, 0.15]),
         ],
     },
 ];
@@ -108,6 +111,9 @@ const SETTINGS: [&str; 5] = ["rays", "own", "neighbours", "max", "sample"];
 const DEFAULT: &str = SETTINGS[4];
 /// Those of Fig. 3, the paper's last rule beside ours.
 const RULES: [&str; 4] = ["own", "neighbours", "max", "sample"];
+
+/// Vertical field of view of the pictures in degrees.
+const FOV_DEG: f32 = 26.0;
 
 /// Voxels around a brick that its matter can touch.
 const OVERLAP: usize = 1;
@@ -181,7 +187,7 @@ pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> R
             |what: &str, step: f64| progress(&format!("{}: {what}", built.name), (n as f64 + step) / 3.0);
         done("updates", 0.0);
         let prepared = Prepared::new(gpu, built, plan)?;
-        let (settings, open) = prepared.race(plan)?;
+        let (settings, mut open) = prepared.race(plan)?;
         scenes.push(SceneFound {
             name: built.name,
             printed_as: built.printed_as,
@@ -190,7 +196,11 @@ pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> R
             settings,
             bricks: bricks(&prepared.volume, &prepared.transfer, &prepared.features, plan.radius as usize),
         });
-        done("pictures", 0.4);
+        done("pictures", 0.6);
+        for (setting, renderer) in SETTINGS.into_iter().zip(&mut open) {
+            renderer.set_setup(Prepared::setup(setting, plan.shown)?)?;
+            renderer.update(&mut |_| ())?;
+        }
         let picture = |which: usize, shading| prepared.picture(&open[which], shading, plan);
         let last = SETTINGS.len() - 1;
         shadings.push(beside(&[
@@ -205,7 +215,7 @@ pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> R
             let crops: Vec<Picture> = rules.iter().map(|rule| crop(rule, at)).collect();
             let shows = format!("{}: {}, and a part of each, enlarged", built.name, RULES.join(", "));
             figures.push((3, shows, above(&[beside(&rules), beside(&crops)])));
-            done("radii", 0.7);
+            done("radii", 0.8);
             let (shows, radii, found) = prepared.radii(open, plan)?;
             figures.push((4, shows, radii));
             changes = found;
@@ -303,10 +313,12 @@ impl<'a> Prepared<'a> {
     }
 
     fn picture(&self, renderer: &Renderer, shading: Shading, plan: &Plan) -> Result<Picture> {
-        let rig = StereoRig::framing(self.volume.size_mm(), 30.0, 20.0);
+        // None of the scenes has anything in the corners of its volume.
+        let rig = StereoRig { fov_deg: FOV_DEG, ..StereoRig::framing(self.volume.size_mm(), 30.0, 20.0) };
         let far = 3.0 * (rig.position - rig.target).length();
         let [left, _] = rig.views(1.0, 0.02 * far, far)?;
-        let (image, _) = renderer.draw(&[left], &Look { shading, ..Look::default() }, [plan.size; 2])?;
+        let (image, _) =
+            renderer.draw(&[left], &Look { shading, gain: 1.0, ..Look::default() }, [plan.size; 2])?;
         Ok(Picture::over(plan.size, plan.size, &image.colour[0], [0.0; 3]))
     }
 

@@ -22,8 +22,9 @@ impl Found {
         let mut lines = vec![
             format!("{device}, {driver}."),
             format!(
-                "Volumes of {0} × {0} × {0} voxels, R = {1} voxels (printed: 16), 16 rays on a spiral; medians of {2} updates of everything, settings in turns.",
-                plan.edge, plan.radius, plan.runs
+                "Volumes of {0} × {0} × {0} voxels, 16 rays on a spiral, timed with R = {1} voxels (printed: 16), drawn with R = {2} where nothing else is said; \
+                 medians of {3} updates of everything, settings in turns.",
+                plan.edge, plan.radius, plan.shown, plan.runs
             ),
         ];
         if self.software {
@@ -32,7 +33,7 @@ impl Found {
         let [own, features] = self.changes;
         let [small, _, large] = plan.radii();
         lines.push(format!(
-            "Fig. 4: from R = {small} to {large} voxels the lit pixels change by {own:.1} levels of 255 by LAO, by {features:.1} with features."
+            "Fig. 4: from R = {small} to {large} voxels (printed: 8 to 32) the lit pixels change by {own:.1} levels of 255 by LAO, by {features:.1} with features."
         ));
         lines
     }
@@ -147,7 +148,7 @@ impl Found {
         for (number, shows, picture) in &self.figures {
             let _ = writeln!(
                 body,
-                "<p><img style=\"max-width: 100%\" alt=\"figure {number}\" src=\"{}\"><br>Fig. {number}, {}</p>",
+                "<p><img style=\"max-width: 100%\" alt=\"figure {number}\" src=\"{}\"></p>\n<p class=\"small\">Fig. {number}, {}</p>",
                 data(&picture.png()?),
                 escaped(shows)
             );
