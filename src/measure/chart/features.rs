@@ -3,7 +3,7 @@
 //!
 //! Scenes have as many features as the paper's: a bucky ball five, a phantom with skin, flesh and bones three (its head), an engine two (its knee).
 //! 16 rays as printed, ours on a spiral. AO is `rays`. Opacities are per 1/32 of the edge, so that a scene looks the same at every size.
-//! Memory: five renderers of one scene, some 25 bytes a voxel each. Cost: seven updates a run and scene, 26 pictures.
+//! Memory: five renderers of one scene, some 25 bytes a voxel each. Cost: five updates a run and scene, 22 pictures.
 
 use super::front::quartiles;
 use super::montage::{above, beside, crop, most_different};
