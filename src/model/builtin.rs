@@ -15,13 +15,17 @@ use crate::volume::Volume;
 use crate::{Error, Result};
 
 /// Names of the built-in volumes, each with one line on what it is.
-pub const NAMES: [(&str, &str); 9] = [
+pub const NAMES: [(&str, &str); 10] = [
     ("engine", "uint8; engine block (110) with bores, bolt holes, oil channels; liners (150), valves (230)"),
     ("fruit", "uint8; rind (200), pith (50), soft flesh (70-120), membranes (140), seeds (240), core (180)"),
     ("beetle", "uint8; a thin shell of chitin (180) with six hollow legs, tissue (40), a hollow trunk"),
     (
         "skeleton",
         "int16, Hounsfield; spine, ribs, breastbone and pelvis of thin bone (300-1000) in soft tissue (40)",
+    ),
+    (
+        "bucky",
+        "uint8; 60 soft balls (255 in the middle) at the corners of a truncated icosahedron, bonds (160) between",
     ),
     ("empty", "uint8; 0 everywhere: every ambient value is 1"),
     ("uniform", "uint8; 255 everywhere"),
@@ -71,6 +75,7 @@ pub fn builtin_box(name: &str, dims: [usize; 3], spacing: [f64; 3]) -> Result<Vo
         "fruit" => Values::U8(sampled(dims, |p, h| fruit(p, h) as u8)),
         "beetle" => Values::U8(sampled(dims, |p, h| beetle(p, h) as u8)),
         "skeleton" => Values::I16(sampled(dims, |p, h| skeleton(p, h) as i16)),
+        "bucky" => Values::U8(sampled(dims, |p, _| bucky(p) as u8)),
         "empty" => Values::U8(indexed(dims, |_| false)),
         "uniform" => Values::U8(indexed(dims, |_| true)),
         "half-space" => Values::U8(indexed(dims, |[_, _, z]| z >= nz / 2)),
@@ -364,4 +369,45 @@ fn skeleton([x, y, z]: [f64; 3], h: f64) -> f64 {
         value = over(value, 800.0, (bowl.abs() - 0.015).max(cut).max(-hole), h);
     }
     nearest(value)
+}
+
+/// A corner of each kind of a truncated icosahedron of edge 2 (golden ratio g): (0, 1, 3g), (1, 2 + g, 2g), (g, 2, 2g + 1). The others follow by
+/// cyclic exchange of the axes and by signs.
+const CORNERS: [[f64; 3]; 3] = [
+    [0.0, 1.0, 4.854_101_966_249_685],
+    [1.0, 3.618_033_988_749_895, 3.236_067_977_499_79],
+    [1.618_033_988_749_895, 2.0, 4.236_067_977_499_79],
+];
+/// From the middle to its corners, and their balls' radius.
+const CAGE: f64 = 0.72;
+const BALL: f64 = 0.22;
+
+/// The carbon cage C60 as its electron density: the sum of (1 - (d / 0.22)^2)^2 over the 60 corners within 0.22 of a place, times 255. Neighbours are 0.29
+/// apart, so that balls of less than 160 join to bonds.
+fn bucky([x, y, z]: [f64; 3]) -> f64 {
+    let r = length3(x, y, z);
+    if (r - CAGE).abs() >= BALL {
+        return 0.0;
+    }
+    // (9 g + 10)^(1/2).
+    let scale = CAGE / 4.956_037_318_135_231;
+    let mut sum = 0.0;
+    for corner in CORNERS {
+        for turn in 0..3 {
+            let [a, b, c] = std::array::from_fn(|axis| scale * corner[(axis + turn) % 3]);
+            for signs in 0..8_u32 {
+                let sign = |bit: u32| if signs >> bit & 1 == 1 { -1.0 } else { 1.0 };
+                // Without a side there is no mirror image.
+                if (a == 0.0 && sign(0) < 0.0) || (b == 0.0 && sign(1) < 0.0) || (c == 0.0 && sign(2) < 0.0) {
+                    continue;
+                }
+                let (dx, dy, dz) = (x - sign(0) * a, y - sign(1) * b, z - sign(2) * c);
+                let part = 1.0 - (dx * dx + dy * dy + dz * dz) / (BALL * BALL);
+                if part > 0.0 {
+                    sum += part * part;
+                }
+            }
+        }
+    }
+    nearest((255.0 * sum).min(255.0))
 }

@@ -4,7 +4,9 @@ use crate::support::Folder;
 use cao::renderer::{COLOUR, Renderer};
 use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, foresee, looks_draw, measure, paper, report};
+use cao_measure::chart::{
+    Chart, Plan, Scene, csv, draw, features, foresee, looks_draw, measure, paper, report,
+};
 use cao_measure::contender::{BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
@@ -132,6 +134,78 @@ fn the_papers_scenes_have_their_shares_tables_and_pictures() {
     let four = (0..4).map(|n| (n.to_string(), builtin("voxel", 4).unwrap())).collect();
     let refused = paper::scenes(&plan, four).unwrap_err().to_string();
     assert!(refused.contains("--data") && refused.contains("engine, beetle, skeleton"), "{refused}");
+}
+
+/// A first look's shape at half its size: the tables have every row, the figures every picture, and rules show different things.
+#[test]
+fn the_paper_of_features_has_its_tables_and_pictures() {
+    let gpu = open();
+    let plan = features::Plan { edge: 16, radius: 4, shown: 4, runs: 1, size: 48 };
+    let found = features::measure(&gpu, &plan, &mut |_, share| assert!(share <= 1.0)).unwrap();
+    close(gpu);
+    assert_eq!(found.scenes.iter().map(|s| s.features.len()).collect::<Vec<_>>(), [5, 3, 2]);
+    for scene in &found.scenes {
+        for (setting, runs) in &scene.settings {
+            assert!(
+                runs.len() == 1 && runs[0].iter().all(|n| n.is_finite() && *n > 0.0),
+                "{setting} {runs:?}"
+            );
+        }
+        let bricks = &scene.bricks;
+        // Two bricks along each axis: a ray from one comes to all.
+        assert!(
+            bricks.all == 8 && bricks.matter == 8 && bricks.skipped.iter().all(|n| *n == 0),
+            "{bricks:?}"
+        );
+    }
+    assert_eq!(found.runs().lines().count(), 1 + 3 * 5);
+    let sizes: Vec<_> = found.figures.iter().map(|(number, _, p)| (*number, p.width, p.height)).collect();
+    assert_eq!(sizes, [(1, 4 * 48, 3 * 48), (3, 4 * 48, 2 * 48), (4, 3 * 48, 2 * 48)]);
+    // Pictures of a figure, in pixels of 48.
+    let part = |figure: usize, column: usize, row: usize| -> Vec<[u8; 3]> {
+        let picture = &found.figures[figure].2;
+        let rows = picture.pixels.chunks(picture.width as usize).skip(48 * row).take(48);
+        rows.flat_map(|line| &line[48 * column..48 * (column + 1)]).copied().collect()
+    };
+    for row in 0..3 {
+        for column in 0..4 {
+            let shown = part(0, column, row);
+            let lit = shown.iter().filter(|p| p.iter().any(|&c| c > 20)).count();
+            assert!(10 * lit > shown.len(), "row {row}, column {column} shows nothing");
+            assert!(column == 0 || shown != part(0, column - 1, row), "row {row}, column {column}");
+        }
+    }
+    assert!(part(1, 0, 0) != part(1, 2, 0) && part(1, 0, 1) != part(1, 2, 1), "own and max are the same");
+    // Rules are compared at one radius: that of the second column of Fig. 4.
+    assert!(part(1, 3, 0) == part(2, 1, 1) && part(1, 3, 0) != part(2, 1, 0), "sample is not itself");
+    assert!(found.changes.iter().all(|change| *change > 0.0), "{:?}", found.changes);
+    let page = found.html("a machine", "cao chart --fdao").unwrap();
+    well_formed(&page).unwrap();
+    for printed in ["237 ms", "912 ms", "3.85", "2.45", "1.66", "417 ms, 12.7 %", "434 ms, 10.7 %", "liners"]
+    {
+        assert!(page.contains(printed), "{printed}");
+    }
+}
+
+/// Known by hand: one voxel in a row of bricks.
+#[test]
+fn bricks_are_empty_where_no_voxel_of_a_feature_is() {
+    let named = |name: &str| cao_model::feature::Feature::new(name);
+    let mut values = vec![0_u8; 64 * 8 * 8];
+    // In the first brick, beside the second; and in the last.
+    (values[7], values[63]) = (10, 20);
+    let values = cao_model::values::Values::U8(values);
+    let volume = cao_model::volume::Volume::new([64, 8, 8], [1.0; 3], values).unwrap();
+    let both = vec![(named("a"), [10.0, 20.0]), (named("b"), [20.0, 30.0])];
+    let both = cao_model::feature::Features::by_intervals(both).unwrap();
+    let opacity = vec![[5.0, 0.0], [6.0, 1.0]];
+    let transfer = TransferFunction::new(opacity, vec![[0.0, 1.0, 1.0, 1.0]], None).unwrap();
+    let found = features::bricks(&volume, &transfer, &both, 4);
+    let expected = features::Bricks { all: 8, matter: 3, empty: vec![1, 2], skipped: vec![1, 2] };
+    assert_eq!(found, expected);
+    // From the last brick a ray of 48 voxels comes to the second, one of 54 to the first.
+    assert_eq!(features::bricks(&volume, &transfer, &both, 45).skipped, [1, 1]);
+    assert_eq!(features::bricks(&volume, &transfer, &both, 54).skipped, [0, 0]);
 }
 
 fn the_picture_is_drawn_in_every_way_and_more_work_errs_less(chart: &Chart) {
@@ -496,6 +570,7 @@ fn what_cannot_be_charted_is_refused_by_name_and_leaves_nothing() {
         ("chart -o no/such/place", 1, "no/such/place"),
         ("chart --runs 0 -o out", 2, "--runs"),
         ("chart --radius-mm 0 -o out", 2, "--radius-mm"),
+        ("chart --fdao --paper -o out", 2, "--paper"),
         ("chart builtin:pear:16 -o out", 1, "pear"),
         ("chart builtin:engine:16 builtin:engine:16 -o out", 2, "given twice"),
         ("chart noise.nrrd -o out", 1, "noise.nrrd"),

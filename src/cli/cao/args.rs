@@ -39,7 +39,8 @@ More in `cao render --help` and so on.
 
 Volumes: NRRD, NIfTI, MetaImage, raw values with --dims and --type, and
 built-in ones, named like files: builtin:NAME:SIZE, with NAME one of
-engine, fruit, beetle, skeleton, empty, uniform, half-space, voxel, sheets.
+engine, fruit, beetle, skeleton, bucky, empty, uniform, half-space, voxel,
+sheets.
 Lengths are millimetres, angles degrees. The origin is the volume's centre;
 x, y, z are the patient's right, anterior, superior where a file states them,
 else the volume's index axes.
@@ -107,6 +108,8 @@ Examples:
   cao chart --quick -o chart              a first look, two minutes
   cao chart head.nrrd --transfer ct-bone --radius-mm 20 -o chart
   cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
+  cao chart --fdao -o features            feature-driven occlusion beside the printed
+                                          times, with its pictures
 
 Writes report.html, which stands alone; chart.svg, chart.png and runs.csv, every
 run of every method; the same of the picture's own settings, pictures.*. A scene without clips gets a ball.";
@@ -347,6 +350,9 @@ pub struct Chart {
     /// The paper's own three scenes, tables and pictures instead
     #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm"])]
     pub paper: bool,
+    /// The scenes, tables and pictures of the paper of method fdao instead: what features cost, and what they show
+    #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm", "paper"])]
+    pub fdao: bool,
     /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms
     #[arg(long, value_name = "FILE", requires = "paper")]
     pub data: Vec<OsString>,

@@ -43,6 +43,9 @@ const PAPER: [&str; 10] = [
     "figure-11-skeleton.png",
 ];
 
+/// What `--fdao` writes.
+const FDAO: [&str; 5] = ["features.html", "features.csv", "figure-1.png", "figure-3.png", "figure-4.png"];
+
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
@@ -50,6 +53,9 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     }
     if args.paper {
         return paper(global, args);
+    }
+    if args.fdao {
+        return fdao(global, args);
     }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
@@ -151,6 +157,38 @@ fn paper(global: &Global, args: &Args) -> Result<ExitCode> {
         let set = cao_model::occlusion::RaySet::parse(rays)?;
         let ups: Vec<String> = found.speed_ups(set).iter().map(|up| format!("{up:.2}")).collect();
         out.line(format!("speed-up of the update with {rays} rays: {}", ups.join(", ")));
+    }
+    for path in targets.paths() {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `--fdao`.
+fn fdao(global: &Global, args: &Args) -> Result<ExitCode> {
+    let targets = Targets::in_folder(&args.output, FDAO.map(str::to_owned))?;
+    let mut progress = Progress::default();
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let plan = chart::features::Plan::of(&gpu, args.quick, args.runs);
+    progress.stage("measuring");
+    let found = chart::features::measure(&gpu, &plan, &mut |what, share| {
+        progress.say(what);
+        progress.set(share);
+    })?;
+    check_validation(&gpu)?;
+    progress.stage("writing");
+    let mut contents = vec![found.html(&machine(), &command())?.into_bytes(), found.runs().into_bytes()];
+    for (.., picture) in &found.figures {
+        contents.push(picture.png()?);
+    }
+    targets.write_all(&contents)?;
+    drop(progress);
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    for line in found.caption().into_iter().skip(1).chain(found.ratios()) {
+        out.line(line);
     }
     for path in targets.paths() {
         out.wrote(path);

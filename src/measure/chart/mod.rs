@@ -7,9 +7,12 @@
 
 pub mod csv;
 pub mod draw;
+pub mod features;
+mod features_page;
 pub mod front;
 pub mod looks;
 pub mod looks_draw;
+mod montage;
 pub mod paper;
 pub mod peers;
 pub mod pictures;

@@ -6,6 +6,7 @@
 //! a quarter of the printed ones. Memory: two contenders of 24 bytes a voxel. Cost: what [`estimate`] says.
 
 use super::looks::{Apart, Looks};
+use super::montage::{CROP, beside, crop, most_different};
 use super::report::{data, inline, page, section};
 use super::tables::{self, escaped};
 use super::{Chart, Point, Run, Scene, SceneChart, VOXEL, front};
@@ -69,9 +70,6 @@ const HALVINGS: usize = 24;
 
 /// The paper's ray sets.
 const SETS: [RaySet; 4] = [RaySet::R6, RaySet::R14, RaySet::R26, RaySet::R54];
-
-/// Crops are enlarged by this.
-const CROP: u32 = 4;
 
 /// Linear colour of everything: the paper's pictures have one.
 const ONE: [f32; 3] = [0.85, 0.80, 0.70];
@@ -404,51 +402,6 @@ fn anti_aliasing(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<(u32, String, 
     let at = most_different(&both);
     let both: Vec<Picture> = both.iter().map(|picture| crop(picture, at)).collect();
     Ok((8, format!("{}: N = 0 and N = 32, × {CROP}", scene.name), beside(&both)))
-}
-
-/// The first pixel of the part, a [`CROP`]th of both edges, in which two pictures of one size differ most: what a close-up is to show. Where
-/// they are the same, of the lightest.
-fn most_different(pictures: &[Picture]) -> [u32; 2] {
-    let [a, b] = pictures else { return [0; 2] };
-    let part = [a.width, a.height].map(|edge| edge / CROP);
-    let differences = |[x, y]: [u32; 2]| -> u64 {
-        let pixels =
-            (y..y + part[1]).flat_map(|row| (x..x + part[0]).map(move |column| row * a.width + column));
-        let apart = |i: u32| (0..3).map(move |c| a.pixels[i as usize][c].abs_diff(b.pixels[i as usize][c]));
-        pixels.flat_map(apart).map(u64::from).sum()
-    };
-    // Half a part apart, all within.
-    let steps = 2 * CROP - 1;
-    let places = (0..steps * steps).map(|n| [n % steps * part[0] / 2, n / steps * part[1] / 2]);
-    let light = |[x, y]: [u32; 2]| -> u64 {
-        let pixels =
-            (y..y + part[1]).flat_map(|row| (x..x + part[0]).map(move |column| row * a.width + column));
-        pixels.map(|i| u64::from(a.pixels[i as usize][1])).sum()
-    };
-    places.max_by_key(|&place| (differences(place), light(place))).unwrap_or([0; 2])
-}
-
-/// A [`CROP`]th of both edges from this pixel on, enlarged to the picture's own size; pixels stay pixels.
-fn crop(of: &Picture, first: [u32; 2]) -> Picture {
-    let size = [of.width, of.height];
-    let pixel = |i: u32| {
-        let (x, y) = (first[0] + i % size[0] / CROP, first[1] + i / size[0] / CROP);
-        of.pixels[(y * size[0] + x) as usize]
-    };
-    Picture { width: size[0], height: size[1], pixels: (0..size[0] * size[1]).map(pixel).collect() }
-}
-
-/// Pictures of one height, from the left to the right.
-fn beside(pictures: &[Picture]) -> Picture {
-    let height = pictures.iter().map(|picture| picture.height).min().unwrap_or(0);
-    let row = |y: u32| {
-        pictures.iter().flat_map(move |p| {
-            let first = (y * p.width) as usize;
-            p.pixels[first..first + p.width as usize].iter().copied()
-        })
-    };
-    let width = pictures.iter().map(|picture| picture.width).sum();
-    Picture { width, height, pixels: (0..height).flat_map(row).collect() }
 }
 
 impl Paper {
