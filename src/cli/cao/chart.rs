@@ -22,7 +22,7 @@ use std::process::ExitCode;
 const DEFAULT: [&str; 3] = ["builtin:engine:48", "builtin:fruit:48", "builtin:skeleton:48"];
 const DEFAULT_RADIUS: f32 = 8.0;
 /// The same for a first look.
-const QUICK: [&str; 3] = ["builtin:engine:24", "builtin:fruit:24", "builtin:skeleton:24"];
+const QUICK: [&str; 3] = ["builtin:engine:22", "builtin:fruit:22", "builtin:skeleton:22"];
 const QUICK_RADIUS: f32 = 4.0;
 
 /// What is written.
