@@ -15,6 +15,7 @@ pub mod look;
 pub mod memory;
 pub mod mesh;
 pub mod methods;
+pub mod network;
 pub mod occlusion;
 pub mod options;
 pub mod order;
