@@ -54,6 +54,8 @@ pub struct Options {
 /// What the shaders may use beyond plain WGSL; each has its feature in the Vulkan layer's `feature.rs` or is core in Vulkan 1.3.
 const CAPABILITIES: Capabilities = Capabilities::IMMEDIATES
     .union(Capabilities::MULTIVIEW)
+    // `pack2x16float` and `unpack2x16float`, which every device has; what naga asks of GL.
+    .union(Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     .union(Capabilities::STORAGE_TEXTURE_16BIT_NORM_FORMATS)
     .union(Capabilities::TEXTURE_ATOMIC);
 

@@ -75,6 +75,7 @@ pub mod field;
 pub mod histograms;
 pub mod host;
 pub mod method;
+pub mod network;
 pub mod pyramid;
 pub mod rays;
 pub mod renderer;

@@ -8,6 +8,7 @@ use crate::cast::full::Full;
 use crate::cones::traced::Cones;
 use crate::features::driven::Driven;
 use crate::histograms::clustered::Clustered;
+use crate::network::predicted::Predicted;
 use crate::rays::traced::Traced;
 use crate::spao::shells::Shells;
 use crate::subject::Subject;
@@ -57,6 +58,11 @@ const MAKERS: &[Maker] = &[
     Maker {
         method: Method::Vicinity,
         new: |on| Ok(Box::new(ByBrick::<Shaded>::new(on)?)),
+        map_radius: |_| None,
+    },
+    Maker {
+        method: Method::Deep,
+        new: |on| Ok(Box::new(ByBrick::<Predicted>::new(on)?)),
         map_radius: |_| None,
     },
     Maker {

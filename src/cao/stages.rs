@@ -58,6 +58,12 @@ pub const LABELS: Stage = Stage::new("labels", Phase::Ambient);
 pub const MASK: Stage = Stage::new("mask", Phase::Ambient);
 /// Rays of features of the bricks within reach of a change.
 pub const FDAO: Stage = Stage::new("fdao", Phase::Ambient);
+/// V_o as a network takes it.
+pub const GRID: Stage = Stage::new("grid", Phase::Ambient);
+/// The network.
+pub const NETWORK: Stage = Stage::new("network", Phase::Ambient);
+/// What it gives these bricks.
+pub const OUTPUT: Stage = Stage::new("output", Phase::Ambient);
 /// The table of shells.
 pub const SHELLS: Stage = Stage::new("shells", Phase::Prepare);
 /// The summed-area table.

@@ -14,6 +14,7 @@ use crate::stages;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
+use cao_model::network::Network;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -41,6 +42,8 @@ pub struct Subject {
     pub(crate) wanted: Setup,
     /// Reference length in mm of the opacities that V_AO is computed from, as of [`Self::setup`].
     pub(crate) ambient_mm: f32,
+    /// The network of method `dvao`.
+    pub network: Network,
     pub(crate) transfer: TransferFunction,
     pub(crate) clips: Vec<Clip>,
     classes: Classes,
@@ -64,6 +67,7 @@ impl Subject {
             ambient_mm: transfer.reference_mm(f64::from(field.min_spacing())),
             setup,
             wanted: setup,
+            network: crate::network::small(),
             transfer,
             clips: Vec::new(),
             classes: Classes::new(gpu)?,

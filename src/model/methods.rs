@@ -18,6 +18,8 @@ pub enum Method {
     Vicinity,
     /// Histograms of neighbourhoods, in clusters.
     Histograms,
+    /// What a network that was trained takes for it.
+    Deep,
     /// Local ambient occlusion of each feature by itself; equal to computing everything bit for bit.
     FeatureDriven,
     /// Local ambient occlusion of the clipped volume, every voxel.
@@ -124,6 +126,21 @@ pub static METHODS: &[Entry] = &[
         lights: Lights::Uniform,
         contextual: true,
         same_values_as: Method::Histograms,
+    },
+    Entry {
+        method: Method::Deep,
+        name: "dvao",
+        title: "Deep volumetric ambient occlusion",
+        what: "what a trained network makes of the whole volume, at every change",
+        source: "DVAO §3",
+        rays: RaySet::None,
+        quadratures: &[Quadrature::Network],
+        sets: &[RaySet::None],
+        options: &[],
+        variants: &[&[]],
+        lights: Lights::Uniform,
+        contextual: false,
+        same_values_as: Method::Deep,
     },
     Entry {
         method: Method::FeatureDriven,
@@ -317,6 +334,7 @@ mod tests {
             Method::Shells,
             Method::Vicinity,
             Method::Histograms,
+            Method::Deep,
             Method::FeatureDriven,
             Method::Spao,
             Method::Cones,
@@ -360,6 +378,7 @@ mod tests {
                 Quadrature::Mean | Quadrature::End | Quadrature::Published => Method::Shells,
                 Quadrature::Visible => Method::Vicinity,
                 Quadrature::Histogram => Method::Histograms,
+                Quadrature::Network => Method::Deep,
                 Quadrature::Product => Method::Spao,
                 Quadrature::Cone => Method::Cones,
             };

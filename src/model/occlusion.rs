@@ -171,11 +171,13 @@ pub enum Quadrature {
     Visible,
     /// The opacity of a neighbourhood's histogram.
     Histogram,
+    /// What a network learned.
+    Network,
 }
 
 impl Quadrature {
     /// Every rule.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Left,
         Self::Cell,
         Self::Segment,
@@ -190,6 +192,7 @@ impl Quadrature {
         Self::Published,
         Self::Visible,
         Self::Histogram,
+        Self::Network,
     ];
     /// Those of rays by the sampler, the paper's first.
     pub const CAST: [Self; 3] = [Self::Left, Self::Cell, Self::Segment];
@@ -215,6 +218,7 @@ impl Quadrature {
             Self::Published => "published",
             Self::Visible => "visible",
             Self::Histogram => "histogram",
+            Self::Network => "network",
         }
     }
 

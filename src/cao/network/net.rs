@@ -1,0 +1,222 @@
+//! A network on the device: its weights, the buffers that its tensors share in turn, and what it does to a grid, in pieces none of which takes a
+//! software driver a tenth of a second.
+//!
+//! Memory: 4 bytes a weight and voxel of a kernel, 64 / 27 of that where what goes in is doubled; tensors as [`Plan`] has them; 8 bytes a voxel of
+//! the grid.
+
+use super::conv3::{self, Conv3, Form, Input, Over};
+use super::moments::{self, Moments, NORM, PARTIAL};
+use super::plan::{Plan, Step};
+use super::resize::{self, Grid, Resize};
+use crate::drive::Part;
+use crate::host::device_buffer;
+use crate::stages;
+use cao_gpu::Result;
+use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Gpu, Image, Recorder};
+use cao_kernels::shared::bricks::GROUPS_PER_ROW;
+use cao_model::network::Network;
+use std::ops::Range;
+
+/// Floating-point operations of a piece on a software driver: some 50 ms of two cores.
+const SLICE: f64 = 4e8;
+/// Operations for which a read and a write of a voxel of a tensor stands.
+const TOUCHED: f64 = 200.0;
+
+/// The kernels.
+pub struct Kernels {
+    conv3: Conv3,
+    moments: Moments,
+    resize: Resize,
+}
+
+impl Kernels {
+    /// Builds the pipelines.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { conv3: Conv3::new(gpu)?, moments: Moments::new(gpu)?, resize: Resize::new(gpu)? })
+    }
+}
+
+/// A network's weights on the device, a buffer a layer.
+pub struct Weights(Vec<Buffer>);
+
+impl Weights {
+    /// Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu, network: &Network) -> Result<Self> {
+        let buffer = |(layer, weights): (cao_model::network::Layer, &[u16])| {
+            let form = match layer.name.as_str() {
+                "first" => Form::First,
+                "last" => Form::Last,
+                name if name.starts_with("decoder") && name.ends_with(".0") => Form::Doubled,
+                _ => Form::Plain,
+            };
+            device_buffer(gpu, &layer.name, bytemuck::cast_slice(&conv3::packed(&layer, weights, form)))
+        };
+        Ok(Self(network.layers().map(buffer).collect::<Result<_>>()?))
+    }
+}
+
+/// What a network needs for grids of one size.
+pub struct Scratch {
+    plan: Plan,
+    tensors: Vec<Buffer>,
+    partials: Buffer,
+    norms: Buffer,
+    grid: Buffer,
+    /// What it gives, an f32 a voxel of the grid.
+    pub values: Buffer,
+    slice: f64,
+}
+
+impl Scratch {
+    /// Allocates it. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu, plan: Plan) -> Result<Self> {
+        let device = |name: &str, bytes: u64| gpu.buffer(name, bytes, BufferUse::Device);
+        let voxels: u64 = plan.dims.iter().map(|d| u64::from(*d)).product();
+        let most = |(t, tensor): (usize, &super::plan::Tensor)| moments::parts(plan.voxels(t)) * tensor.blocks;
+        let parts = plan.tensors.iter().enumerate().map(most).max().unwrap_or(0);
+        let plain = vec![moments::plain(); plan.plain as usize];
+        let norms = device("norms", NORM * u64::from(plan.norms))?;
+        let identity = device_buffer(gpu, "not normalised", bytemuck::cast_slice(&plain))?;
+        let mut rec = gpu.recorder("norms")?;
+        rec.barrier(&[], &[Access::TransferRead, Access::TransferWrite]);
+        rec.copy_buffer(&identity, 0, &norms, 0, identity.bytes())?;
+        rec.submit_and_wait()?;
+        Ok(Self {
+            tensors: plan.buffers.iter().map(|size| device("tensor", 16 * size)).collect::<Result<_>>()?,
+            partials: device("partial moments", PARTIAL * u64::from(parts))?,
+            norms,
+            grid: device("grid", 4 * voxels)?,
+            values: device("values", 4 * voxels)?,
+            slice: if gpu.info().kind == DeviceKind::Cpu { SLICE } else { f64::INFINITY },
+            plan,
+        })
+    }
+
+    /// Voxels of its grids.
+    pub fn dims(&self) -> [u32; 3] {
+        self.plan.dims
+    }
+
+    /// Workgroups of a step, and what one of them costs.
+    fn items(&self, step: &Step) -> (u32, f64) {
+        let tensors = &self.plan.tensors;
+        let touched = TOUCHED * f64::from(cao_kernels::resize::TEAM);
+        match *step {
+            Step::First { to } => {
+                (conv3::items(self.plan.dims, tensors[to].blocks, false), conv3::flops(1, false) / 8.0)
+            }
+            Step::Halve { to, .. } => (resize::items(self.plan.voxels(to) * tensors[to].blocks), touched),
+            Step::Moments { of } => {
+                let part = f64::from(cao_kernels::moments::PART);
+                (moments::parts(self.plan.voxels(of)) * tensors[of].blocks, TOUCHED * part)
+            }
+            Step::Conv { of, beside, doubled, to, .. } => {
+                let blocks = tensors[of].blocks + beside.map_or(0, |t| tensors[t].blocks);
+                let dims = self.plan.dims(tensors[of].level);
+                (conv3::items(dims, tensors[to].blocks, doubled), conv3::flops(blocks, doubled))
+            }
+            Step::Last { of, beside, .. } => {
+                let blocks = tensors[of].blocks + tensors[beside].blocks;
+                (conv3::items(self.plan.dims, 1, false), conv3::flops(blocks, false) / 4.0)
+            }
+        }
+    }
+
+    /// The pieces of so many workgroups of such a cost.
+    fn slices(&self, (items, cost): (u32, f64)) -> impl Iterator<Item = Range<u32>> {
+        let each = ((self.slice / cost) as u32).clamp(1, GROUPS_PER_ROW);
+        (0..items).step_by(each as usize).map(move |first| first..(first + each).min(items))
+    }
+
+    /// From V_o to the values, in order. Opacities are raised to `exponent`.
+    pub fn parts<'a>(
+        &'a self,
+        kernels: &'a Kernels,
+        weights: &'a Weights,
+        opacity: &'a Image,
+        grid: &'a Grid,
+        exponent: f32,
+    ) -> Vec<Part<'a>> {
+        let voxels: u32 = self.plan.dims.iter().product();
+        let samples = grid.voxel.iter().map(|voxel| f64::from((1.0 / voxel).max(1.0).ceil())).product::<f64>();
+        let cost = TOUCHED * samples * f64::from(cao_kernels::resize::TEAM);
+        let shrunk = self.slices((resize::items(voxels), cost)).map(|items| {
+            Part::long(stages::GRID, move |rec| {
+                rec.barrier(&ALL, &ALL);
+                let to = (&self.grid, grid);
+                Ok(kernels.resize.record_shrink(rec, opacity, to, exponent, items.clone())?)
+            })
+        });
+        let steps = self.plan.steps.iter().flat_map(|step| {
+            self.slices(self.items(step)).map(move |items| {
+                Part::long(stages::NETWORK, move |rec| Ok(self.record(rec, kernels, weights, step, items.clone())?))
+            })
+        });
+        shrunk.chain(steps).collect()
+    }
+
+    #[doc(hidden)]
+    pub fn label(&self, part: usize) -> String {
+        let voxels: u32 = self.plan.dims.iter().product();
+        let mut all = vec!["shrink".to_owned(); self.slices((resize::items(voxels), TOUCHED * 64.0)).count()];
+        for step in &self.plan.steps {
+            let (items, cost) = self.items(step);
+            let n = self.slices((items, cost)).count();
+            let gf = f64::from(items) * cost / 1e9;
+            let name = match step { Step::Conv { layer, doubled, to, .. } => format!("conv {layer:2} d{} l{} {gf:.3}", *doubled as u32, self.plan.tensors[*to].level), Step::First { .. } => format!("first {gf:.2}"), Step::Last { .. } => format!("last {gf:.2}"), Step::Halve { .. } => "halve".into(), Step::Moments { .. } => "moments".into() };
+            all.extend(std::iter::repeat_n(name, n));
+        }
+        all[part].clone()
+    }
+
+    fn input(&self, tensor: usize, normalised: bool) -> Input<'_> {
+        let of = &self.plan.tensors[tensor];
+        Input { tensor: &self.tensors[of.buffer], blocks: of.blocks, norm: if normalised { of.norm } else { 0 } }
+    }
+
+    fn output(&self, tensor: usize) -> (&Buffer, u32) {
+        let of = &self.plan.tensors[tensor];
+        (&self.tensors[of.buffer], of.blocks)
+    }
+
+    /// Some workgroups of a step.
+    fn record(
+        &self,
+        rec: &mut Recorder,
+        kernels: &Kernels,
+        weights: &Weights,
+        step: &Step,
+        items: Range<u32>,
+    ) -> Result<()> {
+        rec.barrier(&ALL, &ALL);
+        let plan = &self.plan;
+        let over = |layer: usize, level| Over { dims: plan.dims(level), norms: &self.norms, weights: &weights.0[layer] };
+        match *step {
+            Step::First { to } => {
+                kernels.conv3.record_first(rec, over(0, 0), &self.grid, self.output(to), items)
+            }
+            Step::Halve { of, to } => {
+                let (out, blocks) = self.output(to);
+                let dims = plan.dims(plan.tensors[to].level);
+                kernels.resize.record_halve(rec, [self.output(of).0, out], dims, blocks, items)
+            }
+            Step::Moments { of } => {
+                let (Input { tensor, blocks, norm }, voxels) = (self.input(of, true), plan.voxels(of));
+                let both = [&self.partials, &self.norms];
+                kernels.moments.record(rec, tensor, voxels, blocks, norm, both, items)
+            }
+            Step::Conv { layer, of, beside, doubled, normalised, to } => {
+                let inputs: Vec<_> =
+                    [Some(of), beside].into_iter().flatten().map(|t| self.input(t, normalised)).collect();
+                let over = over(layer, plan.tensors[of].level);
+                kernels.conv3.record(rec, over, &inputs, doubled, self.output(to), items)
+            }
+            Step::Last { layer, of, beside } => {
+                let inputs = [self.input(of, true), self.input(beside, true)];
+                kernels.conv3.record_last(rec, over(layer, 0), inputs, &self.values, items)
+            }
+        }
+    }
+}
+
+const ALL: [Access; 3] = [Access::StorageRead, Access::StorageWrite, Access::SampledRead];
