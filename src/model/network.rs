@@ -93,6 +93,9 @@ impl Shape {
     /// That of the paper, for cubes of 128³: 108,498,960 weights.
     pub const PUBLISHED: Self = Self { edge: 128, filters: 16, cap: 512, levels: 7, label: Label::End };
 
+    /// The one that is used unless another is given: 1,688,904 weights.
+    pub const SMALL: Self = Self { edge: 64, filters: 8, cap: 64, levels: 5, label: Label::Mean };
+
     /// Refuses shapes that there are none of.
     ///
     /// # Errors
@@ -106,7 +109,7 @@ impl Shape {
         within("filters of the network", self.filters, 1, MOST.1)?;
         within("cap of the network", self.cap, self.filters, MOST.1)?;
         within("edge of the network", self.edge, 1 << self.levels, 1024)?;
-        if self.edge % (1 << self.levels) != 0 {
+        if !self.edge.is_multiple_of(1 << self.levels) {
             let problem = format!("is {}; must be a multiple of {}", self.edge, 1 << self.levels);
             return Err(Error::refused("edge of the network", problem));
         }
@@ -205,6 +208,18 @@ impl Network {
     }
 }
 
+/// What 16 bits stand for as f16.
+pub fn half(bits: u16) -> f32 {
+    let (sign, exponent) = (u32::from(bits & 0x8000) << 16, u32::from(bits >> 10 & 31));
+    let fraction = u32::from(bits & 0x3ff);
+    match exponent {
+        // 2^-24 each.
+        0 => f32::from_bits(sign | (fraction as f32 * 2.0_f32.powi(-24)).to_bits()),
+        31 => f32::from_bits(sign | 0x7f80_0000 | fraction << 13),
+        _ => f32::from_bits(sign | (exponent + 112) << 23 | fraction << 13),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,6 +241,22 @@ mod tests {
         };
         assert_eq!(bare(Shape::PUBLISHED), ["first", "encoder.6.0", "encoder.6.1", "middle"]);
         assert_eq!(bare(Shape { levels: 5, ..Shape::PUBLISHED }), ["first"]);
+    }
+
+    #[test]
+    fn halves_are_what_their_bits_say() {
+        let known = [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x0001, 5.960_464_5e-8),
+            (0x83ff, -6.097_555e-5),
+            (0x7bff, 65504.0),
+            (0x3555, 0.333_251_95),
+        ];
+        for (bits, value) in known {
+            assert_eq!(half(bits), value, "{bits:04x}");
+        }
+        assert!(half(0x7c00).is_infinite() && half(0x7e00).is_nan() && half(0x8000).is_sign_negative());
     }
 
     #[test]
