@@ -1,5 +1,5 @@
 //! Files in and out: volumes ([`open`]), meshes ([`obj`]), transfer functions ([`transfer`]), scenes ([`scene`]), pictures
-//! ([`picture`]). One reader a file; what a file says and what it should have said is named in every refusal.
+//! ([`picture`]), weights of networks ([`network`]). One reader a file; what a file says and what it should have said is named in every refusal.
 
 #![forbid(unsafe_code)]
 
@@ -18,6 +18,7 @@ pub mod label;
 mod light;
 mod listing;
 mod metaimage;
+pub mod network;
 mod nifti;
 mod nrrd;
 pub mod obj;

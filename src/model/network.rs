@@ -109,7 +109,7 @@ impl Shape {
         within("filters of the network", self.filters, 1, MOST.1)?;
         within("cap of the network", self.cap, self.filters, MOST.1)?;
         within("edge of the network", self.edge, 1 << self.levels, 1024)?;
-        if self.edge % (1 << self.levels) != 0 {
+        if !self.edge.is_multiple_of(1 << self.levels) {
             let problem = format!("is {}; must be a multiple of {}", self.edge, 1 << self.levels);
             return Err(Error::refused("edge of the network", problem));
         }
@@ -258,7 +258,14 @@ mod tests {
 
     #[test]
     fn halves_are_what_their_bits_say() {
-        let known = [(0x3c00, 1.0), (0xc000, -2.0), (0x0001, 5.960_464_5e-8), (0x83ff, -6.097_555e-5), (0x7bff, 65504.0), (0x3555, 0.333_251_95)];
+        let known = [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x0001, 5.960_464_5e-8),
+            (0x83ff, -6.097_555e-5),
+            (0x7bff, 65504.0),
+            (0x3555, 0.333_251_95),
+        ];
         for (bits, value) in known {
             assert_eq!(half(bits), value, "{bits:04x}");
         }
@@ -266,7 +273,10 @@ mod tests {
             assert_eq!(half_bits(half(bits)), bits);
         }
         // Between two, and half-way.
-        assert_eq!((half_bits(1.0 + 0.6 / 1024.0), half_bits(1.0 + 1.5 / 1024.0), half_bits(1.0 + 2.5 / 1024.0)), (0x3c01, 0x3c02, 0x3c02));
+        assert_eq!(
+            (half_bits(1.0 + 0.6 / 1024.0), half_bits(1.0 + 1.5 / 1024.0), half_bits(1.0 + 2.5 / 1024.0)),
+            (0x3c01, 0x3c02, 0x3c02)
+        );
         assert_eq!((half_bits(1e6), half_bits(3.0e-8), half_bits(2.0_f32.powi(-25))), (0x7c00, 1, 0));
         assert!(half(0x7c00).is_infinite() && half(0x7e00).is_nan() && half(0x8000).is_sign_negative());
     }

@@ -4,8 +4,10 @@
 use cao_formats::Reading;
 use cao_formats::scene::{Scene, VolumeSource};
 use cao_model::mesh::TriangleMesh;
+use cao_model::network::{Label, Shape};
 use cao_testing::fuzz::{changed, changes, config};
-use cao_testing::source;
+use cao_testing::networks::{hashed, network_file, network_header};
+use cao_testing::{network, source};
 use flate2::{Compression, write::GzEncoder};
 use glam::Vec3;
 use proptest::prelude::*;
@@ -235,6 +237,23 @@ proptest! {
         if let Ok(mesh) = TriangleMesh::new("made", &positions, &faces) {
             prop_assert!(mesh.vertices.iter().all(|v| v.is_finite()));
             let _ = (mesh.check_solid(), mesh.bounds(), mesh.signed_volume());
+        }
+    }
+
+    #[test]
+    fn weights_of_networks_are_read_or_refused(changes in changes(), header in any::<bool>(), hash in any::<bool>()) {
+        let net = network(Shape { edge: 4, filters: 1, cap: 2, levels: 1, label: Label::Mean }, 1);
+        let text = network_header(&net, "\"seed\":1,\"data\":[\"a\",\"b\"]");
+        let whole = network_file(&text, net.weights());
+        // Behind the hash of what is changed, and behind a header that is whole but for its text.
+        let bytes = match (header, hash) {
+            (true, _) => network_file(&String::from_utf8_lossy(&changed(text.as_bytes(), &changes)), net.weights()),
+            (false, true) => hashed(changed(&whole[..whole.len() - 32], &changes)),
+            (false, false) => changed(&whole, &changes),
+        };
+        match cao_formats::network::from_bytes(Path::new("a.net"), &bytes) {
+            Ok(read) => prop_assert_eq!(read.network.weights().len(), read.network.shape().weights()),
+            Err(error) => prop_assert!(error.to_string().starts_with("a.net: "), "{error}"),
         }
     }
 

@@ -63,6 +63,8 @@ const CRATES: &[Crate] = &[
             "png",
             "pure_jpegls",
             "serde",
+            "serde_json",
+            "sha2",
             "thiserror",
             "tiff",
             "tobj",
@@ -105,7 +107,7 @@ const CRATES: &[Crate] = &[
             "cao-reflect",
             "cao-twin",
         ],
-        &["bytemuck", "glam", "proptest", "tempfile"],
+        &["bytemuck", "glam", "proptest", "sha2", "tempfile"],
     ),
     uses("benches", "cao-benches", &[], &["criterion"]),
 ];
@@ -249,6 +251,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/settings.rs", &["error", "light", "methods", "occlusion", "options"]),
     ("src/model/clip.rs", &["error", "mesh"]),
     ("src/model/order.rs", &[]),
+    ("src/model/network.rs", &["error"]),
     ("src/model/volume.rs", &["error", "order", "transfer", "values"]),
     ("src/model/frame.rs", &["clip", "error", "light", "look", "values", "view", "volume"]),
     ("src/model/builtin.rs", &["error", "values", "volume"]),
@@ -261,6 +264,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/picture.rs", &["error", "outputs"]),
     ("src/formats/file.rs", &["error", "input"]),
     ("src/formats/polygon.rs", &[]),
+    ("src/formats/network.rs", &["error", "file"]),
     ("src/formats/obj.rs", &["error", "file", "polygon"]),
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
     ("src/formats/light.rs", &["error", "toml_value"]),
@@ -408,7 +412,7 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 16] = [
+const ONLY_IN: [(&str, &[&str]); 17] = [
     ("ash", &["src/gpu/", "src/capi/", "src/wgpu/", "src/xr/"]),
     ("wgpu", &["src/wgpu/"]),
     ("openxr", &["src/xr/"]),
@@ -416,6 +420,7 @@ const ONLY_IN: [(&str, &[&str]); 16] = [
     ("tobj", &["src/formats/obj.rs"]),
     ("earcut", &["src/formats/polygon.rs"]),
     ("tiff", &["src/formats/tiff_stack.rs"]),
+    ("sha2", &["src/formats/network.rs"]),
     ("jpeg_decoder", &["src/formats/dicom/pixels.rs"]),
     ("jpegls", &["src/formats/dicom/pixels.rs"]),
     ("hayro_jpeg2000", &["src/formats/dicom/pixels.rs"]),

@@ -1,12 +1,15 @@
 //! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes ([`meshes`] of several
-//! parts too), [`scan`]s as files; [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
+//! parts too), [`scan`]s as files, [`networks`] and what PyTorch makes of them; [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
 
 #![deny(unsafe_code)]
 
 pub mod fuzz;
 pub mod meshes;
+pub mod networks;
 pub mod scan;
 pub mod wgsl;
+
+pub use networks::{Reference, network, network_bytes, network_references};
 
 use cao::field::Field;
 use cao::field::volume_image;

@@ -181,7 +181,8 @@ pub fn packed(layer: &Layer, weights: &[u16], form: Form) -> Vec<u16> {
                 let at = [tap % 3, tap / 3 % 3, tap / 9];
                 for child in 0..8 {
                     // Of the low child tap 0 lies in the coarse voxel before, of the high one taps 0 and 1 in its own.
-                    let met = (0..3).map(|axis| usize::from(at[axis] > child >> axis & 1) << axis).sum::<usize>();
+                    let met =
+                        (0..3).map(|axis| usize::from(at[axis] > child >> axis & 1) << axis).sum::<usize>();
                     all[((pair * 64 + child * 8 + met) * lanes + lane) * lanes + out] += weight;
                 }
             }

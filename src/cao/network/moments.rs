@@ -52,7 +52,10 @@ impl Moments {
         let binds = kernel::PartialBindings { source, partials };
         rec.dispatch(&self.partial, &binds, push, [items.len() as u32, 1, 1])?;
         if items.end == blocks * params.parts {
-            rec.barrier(&[Access::StorageRead, Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+            rec.barrier(
+                &[Access::StorageRead, Access::StorageWrite],
+                &[Access::StorageRead, Access::StorageWrite],
+            );
             let binds = kernel::MergeBindings { partials, norms };
             rec.dispatch(&self.merge, &binds, push, [blocks, 1, 1])?;
         }

@@ -72,7 +72,8 @@ impl Scratch {
     pub fn new(gpu: &Gpu, plan: Plan) -> Result<Self> {
         let device = |name: &str, bytes: u64| gpu.buffer(name, bytes, BufferUse::Device);
         let voxels: u64 = plan.dims.iter().map(|d| u64::from(*d)).product();
-        let most = |(t, tensor): (usize, &super::plan::Tensor)| moments::parts(plan.voxels(t)) * tensor.blocks;
+        let most =
+            |(t, tensor): (usize, &super::plan::Tensor)| moments::parts(plan.voxels(t)) * tensor.blocks;
         let parts = plan.tensors.iter().enumerate().map(most).max().unwrap_or(0);
         let plain = vec![moments::plain(); plan.plain as usize];
         let norms = device("norms", NORM * u64::from(plan.norms))?;
@@ -138,7 +139,8 @@ impl Scratch {
         exponent: f32,
     ) -> Vec<Part<'a>> {
         let voxels: u32 = self.plan.dims.iter().product();
-        let samples = grid.voxel.iter().map(|voxel| f64::from((1.0 / voxel).max(1.0).ceil())).product::<f64>();
+        let samples =
+            grid.voxel.iter().map(|voxel| f64::from((1.0 / voxel).max(1.0).ceil())).product::<f64>();
         let cost = TOUCHED * samples * f64::from(cao_kernels::resize::TEAM);
         let shrunk = self.slices((resize::items(voxels), cost)).map(|items| {
             Part::long(stages::GRID, move |rec| {
@@ -149,7 +151,9 @@ impl Scratch {
         });
         let steps = self.plan.steps.iter().flat_map(|step| {
             self.slices(self.items(step)).map(move |items| {
-                Part::long(stages::NETWORK, move |rec| Ok(self.record(rec, kernels, weights, step, items.clone())?))
+                Part::long(stages::NETWORK, move |rec| {
+                    Ok(self.record(rec, kernels, weights, step, items.clone())?)
+                })
             })
         });
         shrunk.chain(steps).collect()
@@ -163,7 +167,15 @@ impl Scratch {
             let (items, cost) = self.items(step);
             let n = self.slices((items, cost)).count();
             let gf = f64::from(items) * cost / 1e9;
-            let name = match step { Step::Conv { layer, doubled, to, .. } => format!("conv {layer:2} d{} l{} {gf:.3}", *doubled as u32, self.plan.tensors[*to].level), Step::First { .. } => format!("first {gf:.2}"), Step::Last { .. } => format!("last {gf:.2}"), Step::Halve { .. } => "halve".into(), Step::Moments { .. } => "moments".into() };
+            let name = match step {
+                Step::Conv { layer, doubled, to, .. } => {
+                    format!("conv {layer:2} d{} l{} {gf:.3}", *doubled as u32, self.plan.tensors[*to].level)
+                }
+                Step::First { .. } => format!("first {gf:.2}"),
+                Step::Last { .. } => format!("last {gf:.2}"),
+                Step::Halve { .. } => "halve".into(),
+                Step::Moments { .. } => "moments".into(),
+            };
             all.extend(std::iter::repeat_n(name, n));
         }
         all[part].clone()
@@ -171,7 +183,11 @@ impl Scratch {
 
     fn input(&self, tensor: usize, normalised: bool) -> Input<'_> {
         let of = &self.plan.tensors[tensor];
-        Input { tensor: &self.tensors[of.buffer], blocks: of.blocks, norm: if normalised { of.norm } else { 0 } }
+        Input {
+            tensor: &self.tensors[of.buffer],
+            blocks: of.blocks,
+            norm: if normalised { of.norm } else { 0 },
+        }
     }
 
     fn output(&self, tensor: usize) -> (&Buffer, u32) {
@@ -190,7 +206,11 @@ impl Scratch {
     ) -> Result<()> {
         rec.barrier(&ALL, &ALL);
         let plan = &self.plan;
-        let over = |layer: usize, level| Over { dims: plan.dims(level), norms: &self.norms, weights: &weights.0[layer] };
+        let over = |layer: usize, level| Over {
+            dims: plan.dims(level),
+            norms: &self.norms,
+            weights: &weights.0[layer],
+        };
         match *step {
             Step::First { to } => {
                 kernels.conv3.record_first(rec, over(0, 0), &self.grid, self.output(to), items)

@@ -73,7 +73,15 @@ impl Plan {
             }
             skips.push(x);
         }
-        x = made.conv(layer, x, None, false, layers[layer].normalised, shape.levels, blocks(layers[layer].outputs));
+        x = made.conv(
+            layer,
+            x,
+            None,
+            false,
+            layers[layer].normalised,
+            shape.levels,
+            blocks(layers[layer].outputs),
+        );
         layer += 1;
         for level in (0..shape.levels).rev() {
             let skip = skips.pop();
@@ -146,7 +154,8 @@ impl Maker {
                 norms += self.tensors[of].blocks;
             }
         }
-        let last_use = |tensor: usize| self.steps.iter().rposition(|step| reads(step).contains(&Some(tensor)));
+        let last_use =
+            |tensor: usize| self.steps.iter().rposition(|step| reads(step).contains(&Some(tensor)));
         let ends: Vec<_> = (0..self.tensors.len()).map(last_use).collect();
         let size = |tensor: &Tensor| {
             let voxels: u64 = dims.iter().map(|d| u64::from(d >> tensor.level)).product();
@@ -210,7 +219,12 @@ mod tests {
                     assert_eq!(holds[plan.tensors[read].buffer], Some(read), "{step:?}");
                 }
                 if let Some(to) = makes(step) {
-                    assert!(reads(step).into_iter().flatten().all(|t| plan.tensors[t].buffer != plan.tensors[to].buffer));
+                    assert!(
+                        reads(step)
+                            .into_iter()
+                            .flatten()
+                            .all(|t| plan.tensors[t].buffer != plan.tensors[to].buffer)
+                    );
                     holds[plan.tensors[to].buffer] = Some(to);
                     let size = u64::from(plan.voxels(to)) * u64::from(plan.tensors[to].blocks);
                     assert!(size <= plan.buffers[plan.tensors[to].buffer]);

@@ -72,8 +72,12 @@ impl Resize {
         items: Range<u32>,
     ) -> Result<()> {
         let count = dims.iter().product::<u32>() * blocks;
-        let params =
-            kernel::ResizeParams { dims, count, base: items.start * kernel::TEAM, ..bytemuck::Zeroable::zeroed() };
+        let params = kernel::ResizeParams {
+            dims,
+            count,
+            base: items.start * kernel::TEAM,
+            ..bytemuck::Zeroable::zeroed()
+        };
         let binds = kernel::HalveBindings { source, out };
         rec.dispatch(&self.halve, &binds, bytemuck::bytes_of(&params), [items.len() as u32, 1, 1])
     }
