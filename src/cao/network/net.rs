@@ -1,7 +1,7 @@
 //! A network on the device: its weights, the buffers that its tensors share in turn, and what it does to a grid, in pieces none of which takes a
 //! software driver a tenth of a second.
 //!
-//! Memory: 4 bytes a weight and voxel of a kernel, 64 / 27 of that where what goes in is doubled; tensors as [`Plan`] has them; 8 bytes a voxel of
+//! Memory: 2 bytes a weight, 64 / 27 of that where what goes in is doubled; tensors as [`Plan`] has them; 8 bytes a voxel of
 //! the grid.
 
 use super::conv3::{self, Conv3, Form, Input, Over};
@@ -17,8 +17,8 @@ use cao_kernels::shared::bricks::GROUPS_PER_ROW;
 use cao_model::network::Network;
 use std::ops::Range;
 
-/// Floating-point operations of a piece on a software driver: some 50 ms of two cores.
-const SLICE: f64 = 4e8;
+/// Floating-point operations of a piece on a software driver: some 20 ms of two cores.
+const SLICE: f64 = 2e8;
 /// Operations for which a read and a write of a voxel of a tensor stands.
 const TOUCHED: f64 = 200.0;
 
@@ -57,12 +57,14 @@ impl Weights {
 
 /// What a network needs for grids of one size.
 pub struct Scratch {
-    plan: Plan,
+    /// Its steps.
+    pub plan: Plan,
     tensors: Vec<Buffer>,
     partials: Buffer,
     norms: Buffer,
-    grid: Buffer,
-    /// What it gives, an f32 a voxel of the grid.
+    /// What goes in, an f32 a voxel.
+    pub grid: Buffer,
+    /// What comes out, an f32 a voxel.
     pub values: Buffer,
     slice: f64,
 }
@@ -91,11 +93,6 @@ impl Scratch {
             slice: if gpu.info().kind == DeviceKind::Cpu { SLICE } else { f64::INFINITY },
             plan,
         })
-    }
-
-    /// Voxels of its grids.
-    pub fn dims(&self) -> [u32; 3] {
-        self.plan.dims
     }
 
     /// Workgroups of a step, and what one of them costs.
@@ -129,56 +126,42 @@ impl Scratch {
         (0..items).step_by(each as usize).map(move |first| first..(first + each).min(items))
     }
 
-    /// From V_o to the values, in order. Opacities are raised to `exponent`.
-    pub fn parts<'a>(
+    /// The grid from V_o, whose opacities are raised to `exponent`.
+    pub fn shrink<'a>(
         &'a self,
         kernels: &'a Kernels,
-        weights: &'a Weights,
         opacity: &'a Image,
         grid: &'a Grid,
         exponent: f32,
-    ) -> Vec<Part<'a>> {
+    ) -> impl Iterator<Item = Part<'a>> {
         let voxels: u32 = self.plan.dims.iter().product();
         let samples =
             grid.voxel.iter().map(|voxel| f64::from((1.0 / voxel).max(1.0).ceil())).product::<f64>();
         let cost = TOUCHED * samples * f64::from(cao_kernels::resize::TEAM);
-        let shrunk = self.slices((resize::items(voxels), cost)).map(|items| {
+        self.slices((resize::items(voxels), cost)).map(move |items| {
             Part::long(stages::GRID, move |rec| {
                 rec.barrier(&ALL, &ALL);
-                let to = (&self.grid, grid);
-                Ok(kernels.resize.record_shrink(rec, opacity, to, exponent, items.clone())?)
+                Ok(kernels.resize.record_shrink(rec, opacity, (&self.grid, grid), exponent, items.clone())?)
             })
-        });
-        let steps = self.plan.steps.iter().flat_map(|step| {
-            self.slices(self.items(step)).map(move |items| {
-                Part::long(stages::NETWORK, move |rec| {
-                    Ok(self.record(rec, kernels, weights, step, items.clone())?)
-                })
-            })
-        });
-        shrunk.chain(steps).collect()
+        })
     }
 
-    #[doc(hidden)]
-    pub fn label(&self, part: usize) -> String {
-        let voxels: u32 = self.plan.dims.iter().product();
-        let mut all = vec!["shrink".to_owned(); self.slices((resize::items(voxels), TOUCHED * 64.0)).count()];
-        for step in &self.plan.steps {
-            let (items, cost) = self.items(step);
-            let n = self.slices((items, cost)).count();
-            let gf = f64::from(items) * cost / 1e9;
-            let name = match step {
-                Step::Conv { layer, doubled, to, .. } => {
-                    format!("conv {layer:2} d{} l{} {gf:.3}", *doubled as u32, self.plan.tensors[*to].level)
-                }
-                Step::First { .. } => format!("first {gf:.2}"),
-                Step::Last { .. } => format!("last {gf:.2}"),
-                Step::Halve { .. } => "halve".into(),
-                Step::Moments { .. } => "moments".into(),
-            };
-            all.extend(std::iter::repeat_n(name, n));
-        }
-        all[part].clone()
+    /// A step of the [plan](Self::plan), of which each needs those before.
+    pub fn step<'a>(
+        &'a self,
+        kernels: &'a Kernels,
+        weights: &'a Weights,
+        step: &'a Step,
+    ) -> impl Iterator<Item = Part<'a>> {
+        self.slices(self.items(step)).map(move |items| {
+            let record = move |rec: &mut Recorder| self.record(rec, kernels, weights, step, items.clone());
+            Part::long(stages::NETWORK, move |rec| Ok(record(rec)?))
+        })
+    }
+
+    /// Where a tensor of the plan is from the step that makes it to the last that reads it.
+    pub fn tensor(&self, tensor: usize) -> &Buffer {
+        &self.tensors[self.plan.tensors[tensor].buffer]
     }
 
     fn input(&self, tensor: usize, normalised: bool) -> Input<'_> {
@@ -191,8 +174,7 @@ impl Scratch {
     }
 
     fn output(&self, tensor: usize) -> (&Buffer, u32) {
-        let of = &self.plan.tensors[tensor];
-        (&self.tensors[of.buffer], of.blocks)
+        (self.tensor(tensor), self.plan.tensors[tensor].blocks)
     }
 
     /// Some workgroups of a step.

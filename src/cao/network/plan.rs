@@ -22,15 +22,46 @@ pub struct Tensor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// The first convolution, of the grid.
-    First { to: usize },
+    First {
+        /// What it makes.
+        to: usize,
+    },
     /// Every second voxel.
-    Halve { of: usize, to: usize },
+    Halve {
+        /// Of this.
+        of: usize,
+        /// What it makes.
+        to: usize,
+    },
     /// Mean and deviation of every channel.
-    Moments { of: usize },
-    /// Convolution number `layer` of one tensor, or of two beside each other, on a grid twice as fine where `doubled`.
-    Conv { layer: usize, of: usize, beside: Option<usize>, doubled: bool, normalised: bool, to: usize },
+    Moments {
+        /// Of this.
+        of: usize,
+    },
+    /// A convolution.
+    Conv {
+        /// Its number in the list of layers.
+        layer: usize,
+        /// Of this,
+        of: usize,
+        /// and of this beside it.
+        beside: Option<usize>,
+        /// Whether to a grid twice as fine.
+        doubled: bool,
+        /// Whether what goes in is normalised.
+        normalised: bool,
+        /// What it makes.
+        to: usize,
+    },
     /// The last one, to the grid.
-    Last { layer: usize, of: usize, beside: usize },
+    Last {
+        /// Its number.
+        layer: usize,
+        /// Of this,
+        of: usize,
+        /// and of this beside it.
+        beside: usize,
+    },
 }
 
 /// What a network does to a grid.

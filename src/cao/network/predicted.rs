@@ -77,7 +77,7 @@ impl Gather for Predicted {
 
     fn set(&mut self, on: &Subject) -> Result<()> {
         let grid = grid(self.network.shape(), &on.field, on.setup.occlusion.radius_mm)?;
-        if grid.dims != self.scratch.dims() {
+        if grid.dims != self.scratch.plan.dims {
             self.scratch = Scratch::new(&on.gpu, Plan::new(self.network.shape(), grid.dims))?;
         }
         self.grid = grid;
@@ -96,7 +96,9 @@ impl Gather for Predicted {
         // A voxel of the grid in mm, and what the network takes opacities to be per.
         let step = on.field.spacing[0] / self.grid.voxel[0];
         let exponent = self.network.shape().label.reference() * step / on.ambient_mm;
-        self.scratch.parts(&self.kernels, &self.weights, from.opacity, &self.grid, exponent)
+        let net = &self.scratch;
+        let steps = net.plan.steps.iter().flat_map(|step| net.step(&self.kernels, &self.weights, step));
+        net.shrink(&self.kernels, from.opacity, &self.grid, exponent).chain(steps).collect()
     }
 
     fn stage(&self) -> (Stage, u32) {
