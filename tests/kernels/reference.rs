@@ -59,6 +59,7 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
             Integral::ambient(6.0 * smallest, 0.5 * smallest, 8, 100, smallest),
             Integral::ambient(40.0 * smallest, 0.0, 3, 100, smallest),
             Integral::literal(6.0 * smallest, 100, smallest),
+            Integral::end(6.0 * smallest, 100, smallest),
             Integral::ambient(0.0, 0.0, 8, 100, smallest),
             Integral {
                 light: AmbientLight::Sky([1.0, -2.0, 0.5]),

@@ -1,0 +1,117 @@
+//! `cao examples`: volumes, transfer functions and exact ambient values to train a network on, as files.
+//!
+//! Each example is a file of four cubes, one after the other, of edge³ numbers of 16 bits, little-endian, x fastest, 65535 for 1: opacity,
+//! label `mean`, label `end`, values. `examples.json` has edge, seed and what each example is of. In NumPy:
+//! `numpy.fromfile(name, "<u2").reshape(4, edge, edge, edge)`, axes z, y, x.
+
+use crate::args::{Examples, Global, usage};
+use anyhow::{Context, Result};
+use cao_cli::output::{Out, Progress, check_validation, open_gpu};
+use cao_cli::targets::Targets;
+use cao_measure::error::Errors;
+use cao_measure::examples::labels::radius;
+use cao_measure::examples::source::{SOLIDS, Scan, Source};
+use cao_measure::examples::{Example, Maker, Plan};
+use cao_model::builtin::NAMES;
+use cao_model::error::shown_path;
+use cao_model::network::Label;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+const INDEX: &str = "examples.json";
+
+pub fn run(global: &Global, args: &Examples) -> Result<ExitCode> {
+    let mut progress = Progress::default();
+    progress.stage("reading");
+    let sources = sources(args)?;
+    let name = |i: usize| format!("{i:05}.u16");
+    let names = (0..args.count as usize).map(name).chain([INDEX.to_owned()]);
+    let targets = Targets::in_folder(&args.output, names)?;
+    targets.spare_inputs()?;
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let plan = Plan { edge: args.edge as usize, samples: args.samples as usize, seed: args.seed };
+    let mut maker = Maker::new(&gpu, plan, sources)?;
+    progress.stage("examples");
+    let mut made = Vec::new();
+    let mut checked = Vec::new();
+    targets.write(|files| {
+        for i in 0..args.count as usize {
+            let example = maker.make(i)?;
+            files.write(&args.output.join(name(i)), |file| file.write_all(&bytes(&example)))?;
+            made.push(described(&name(i), &example));
+            checked.extend(example.errors);
+            progress.set((i + 1) as f64 / f64::from(args.count));
+        }
+        let info = gpu.info();
+        let index = json!({
+            "program": format!("cao {}", env!("CARGO_PKG_VERSION")),
+            "device": info.name,
+            "edge": args.edge, "samples": args.samples, "seed": args.seed, "radius": radius(args.edge as usize),
+            "cubes": ["opacity", "mean", "end", "values"],
+            "examples": made,
+        });
+        let text = serde_json::to_string_pretty(&index).context("the index is no JSON")?;
+        Ok(files.write(&args.output.join(INDEX), |file| file.write_all(text.as_bytes()))?)
+    })?;
+    check_validation(&gpu)?;
+    drop(progress);
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    out.line(format!("examples  {} of {} voxels along each axis, seed {}", args.count, args.edge, args.seed));
+    let mut stated = serde_json::Map::new();
+    for (k, label) in Label::ALL.into_iter().enumerate() {
+        let worst = checked.iter().map(|errors| errors[k].rmse).fold(0.0, f64::max);
+        out.line(format!(
+            "  {:<7} off by at most {worst:.4} (root mean square) in {} that the reference checked",
+            label.name(),
+            checked.len()
+        ));
+        stated.insert(label.name().into(), worst.into());
+    }
+    out.json(json!({ "examples": args.count, "checked": checked.len(), "largest_rmse": stated }));
+    out.wrote(&args.output.join(INDEX));
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Those that are named, else those that are made.
+fn sources(args: &Examples) -> Result<Vec<Source>> {
+    let known = || NAMES.iter().map(|(name, _)| *name).chain([SOLIDS]);
+    let mut sources = Vec::new();
+    for name in &args.builtin {
+        if !known().any(|one| one == name) {
+            let known = known().collect::<Vec<_>>().join(", ");
+            return Err(usage(format!("--builtin {name}: no such volume; expected one of {known}")));
+        }
+        sources.push(if name == SOLIDS { Source::Solids } else { Source::Builtin(name.clone()) });
+    }
+    for path in &args.volume {
+        let volume = args.raw.open(path)?;
+        let name = Path::new(path).file_name().map_or_else(|| shown_path(path), |name| shown_path(&name));
+        sources.push(Source::Given(Arc::new(Scan::new(&name, &volume))));
+    }
+    if sources.is_empty() {
+        return Err(usage("nothing to make examples of; expected --builtin NAME or --volume FILE"));
+    }
+    Ok(sources)
+}
+
+fn bytes(example: &Example) -> Vec<u8> {
+    let [mean, end] = &example.labels;
+    let cubes = [&example.opacity, mean, end, &example.values];
+    cubes.into_iter().flatten().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+fn described(file: &str, example: &Example) -> Value {
+    let of = |errors: &Errors| json!({ "rmse": errors.rmse, "bias": errors.bias, "voxels": errors.count });
+    json!({
+        "file": file,
+        "source": example.source,
+        "given": example.given,
+        "transfer": example.transfer,
+        "checked": example.errors.as_ref().map(|[mean, end]| json!({ "mean": of(mean), "end": of(end) })),
+    })
+}
