@@ -11,6 +11,7 @@ mod clipping;
 mod clusters;
 mod cone;
 mod dilate;
+mod examples;
 mod expand;
 mod extent;
 mod fdao;

@@ -7,8 +7,6 @@ import pathlib
 import numpy
 import torch
 
-CUBES = {"opacity": 0, "mean": 1, "end": 2, "values": 3}
-
 # Where volumes that are no built-in ones come from; tools/get-data fetches them. Of each its kind.
 GIVEN = {
     "cranium.mhd": ("CT", "head, CT; InVesalius' example data, CTI Renato Archer; GPL-2"),
@@ -37,10 +35,13 @@ class Examples:
             if self.edge not in (None, index["edge"]):
                 raise SystemExit(f"{folder}: cubes of {index['edge']} voxels; expected {self.edge} as in the others")
             self.edge = index["edge"]
-            shape = (len(CUBES), *[self.edge] * 3)
-            for example in index["examples"]:
-                cubes = numpy.fromfile(folder / example["file"], "<u2").reshape(shape)
-                self.data.append(cubes[[CUBES[cube] for cube in self.cubes]])
+            missing = set(self.cubes) - set(index["cubes"])
+            if missing:
+                raise SystemExit(f"{folder}: has no {', '.join(missing)}; it has {', '.join(index['cubes'])}")
+            wanted = [index["cubes"].index(cube) for cube in self.cubes]
+            data = numpy.memmap(folder / "examples.u16", "<u2", "r", shape=(len(index["examples"]), len(index["cubes"]), *[self.edge] * 3))
+            for i, example in enumerate(index["examples"]):
+                self.data.append(data[i, wanted])
                 self.points.append(torch.tensor(example["transfer"], dtype=torch.float32)[None])
                 kind_of, credit = kind(example["source"], example["given"])
                 self.list.append({"source": example["source"], "kind": kind_of, "credit": credit})

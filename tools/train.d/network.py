@@ -16,11 +16,10 @@ from dataclasses import asdict, dataclass
 import numpy
 import torch
 from active import Active
+from arguments import INJECTIONS, LABELS
 from torch import nn
 from torch.nn import functional as F
 
-INJECTIONS = ("preclassified", "global", "latent")
-LABELS = ("mean", "end")
 DESCRIPTOR = 64
 
 

@@ -14,7 +14,7 @@ def grouped(judged, key):
     return {name: {"examples": len(rows)} | {e: statistics.mean(row[e] for row in rows) for e in ERRORS} for name, rows in groups.items()}
 
 
-def card(session, processor, judged):
+def card(session, processor, precision, judged):
     """What weights say of themselves: strings and numbers only."""
     settings = session.settings
     credits = {row["credit"] for row in session.examples.list}
@@ -30,7 +30,7 @@ def card(session, processor, judged):
         "steps": session.steps,
         "minutes": round(session.seconds / 60, 1),
         "processor": processor,
-        "precision": str(session.net.precision).removeprefix("torch."),
+        "precision": precision,
     }
     for name, group in grouped(judged, lambda row: row["set"]).items():
         out |= {f"{name} {error}": round(group[error], 5) for error in ("ssim2", "ssim3", "mse")}
@@ -54,7 +54,7 @@ def markdown(session, card, judged, weights, digest):
         "",
         *[f"* {key}: {value}" for key, value in card.items()],
         "",
-        "Errors at the end, with the weights in f16, each the mean over examples of the mean over voxels:",
+        "Errors at the end, with the weights in f16 and everything else in f32, each the mean over examples of the mean over voxels:",
         "",
         *table(grouped(judged, lambda row: row["set"]), "set"),
         "",

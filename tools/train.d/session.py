@@ -5,6 +5,7 @@ import random
 import time
 
 import torch
+from active import fuse
 from lookahead import Lookahead
 from loss import loss, mse, ssim2, ssim3
 from network import Net
@@ -46,6 +47,7 @@ class Session:
     def choose(self):
         """Measures a step in f32 and in bf16, which many processors are faster with and some a lot slower, and takes the faster one.
         Returns seconds a step. Weights and loss are f32 in any case."""
+        fuse(self.device)
         found = {}
         for precision in (torch.float32, torch.bfloat16):
             self.net.precision = precision

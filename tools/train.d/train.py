@@ -1,38 +1,22 @@
-"""Trains a network on examples: train.py --data DIR --out DIR [options]; --help lists them. tools/train prepares what it needs."""
+"""Trains a network on examples; tools/train prepares what it needs."""
 
-import argparse
 import json
-import pathlib
 import time
 
+import arguments
 import curve
 import report
 import torch
 from data import Examples
-from loss import LOSSES
-from network import INJECTIONS, LABELS, Shape, write
+from network import Shape, write
 from session import Session, processor
 
-# Seconds between checkpoints, and between validations where an epoch takes longer.
-SAVED, JUDGED = 60, 300
+# Seconds between checkpoints, and between validations with --minutes; without, every epoch is validated.
+SAVED, JUDGED = 60, 180
 # An epoch without better validation halves the rate after two and ends a training without --minutes after five.
 STALE = 5
-
-
-def arguments():
-    parser = argparse.ArgumentParser(prog="train.py", description=__doc__)
-    parser.add_argument("--data", type=pathlib.Path, required=True, help="folder with train*, validation* and unseen*, each of `cao examples`")
-    parser.add_argument("--out", type=pathlib.Path, required=True, help="folder of this training; goes on where one ended there")
-    parser.add_argument("--minutes", type=float, help="train so long; without it until validation gets no better")
-    parser.add_argument("--epochs", type=int, default=50, help="at most so many without --minutes [50]")
-    parser.add_argument("--label", choices=LABELS, default="mean")
-    parser.add_argument("--injection", choices=INJECTIONS, default="preclassified")
-    parser.add_argument("--loss", choices=LOSSES, default="ssim2+mse")
-    for name, value in (("edge", 64), ("filters", 8), ("cap", 64), ("levels", 5), ("seed", 1)):
-        parser.add_argument(f"--{name}", type=int, default=value, help=f"[{value}]")
-    parser.add_argument("--threads", type=int, help="of the processor [all]")
-    parser.add_argument("--plan", action="store_true", help="say what it would take, and do nothing else")
-    return parser.parse_args()
+# Without --minutes at most so many epochs.
+EPOCHS = 50
 
 
 def sets(folder, name, args):
@@ -61,7 +45,7 @@ def state(session, seconds, args):
         f"{len(session.examples)} examples, {epoch:.1f} minutes an epoch",
     ]
     if args.minutes is None:
-        lines.append(f"will take at most {args.epochs} epochs, {args.epochs * epoch:.0f} minutes")
+        lines.append(f"will take at most {EPOCHS} epochs, {EPOCHS * epoch:.0f} minutes")
     else:
         left = max(args.minutes - session.seconds / 60, 0)
         lines.append(f"will take {left:.1f} minutes, about {left / max(epoch, 1e-9):.1f} epochs")
@@ -71,28 +55,25 @@ def state(session, seconds, args):
 def over(session, args):
     if args.minutes is not None:
         return session.seconds >= 60 * args.minutes
-    return session.stale >= STALE or session.epochs > args.epochs
+    return session.stale >= STALE or session.epochs > EPOCHS
 
 
 def train(session, args):
-    """Steps until it is over."""
-    last = {"saved": time.perf_counter(), "judged": time.perf_counter(), "epoch": session.epochs}
-    tick = time.perf_counter()
+    """Steps until it is over. All time counts, that of validation too."""
+    start = time.perf_counter() - session.seconds
+    saved = judged = session.seconds
     while not over(session, args):
         if args.minutes is not None:
             session.cooled(session.seconds / 60 / args.minutes)
         session.step()
-        now = time.perf_counter()
-        session.seconds, tick = session.seconds + now - tick, now
-        ended = not session.order
-        if ended or (args.minutes is not None and now - last["judged"] > JUDGED):
-            row = session.validate()
-            say(session, row)
+        session.seconds = time.perf_counter() - start
+        if session.seconds - judged > JUDGED if args.minutes else not session.order:
+            say(session, session.validate())
             files(session, args)
-            now = tick = last["judged"] = time.perf_counter()
-        if now - last["saved"] > SAVED:
+            judged = session.seconds
+        if session.seconds - saved > SAVED:
             session.save(args.out / "checkpoint.pt")
-            last["saved"] = tick = time.perf_counter()
+            saved = session.seconds
     if session.count:
         say(session, session.validate())
     session.save(args.out / "checkpoint.pt")
@@ -114,11 +95,13 @@ def files(session, args):
 
 def finish(session, args):
     """Judges the weights as files have them and writes everything."""
+    precision = str(session.net.precision).removeprefix("torch.")
+    session.net.precision = torch.float32
     with torch.no_grad():
         for weight in session.net.parameters():
             weight.copy_(weight.to(torch.float16))
     judged = session.judge()
-    described = report.card(session, processor(), judged)
+    described = report.card(session, processor(), precision, judged)
     weights = sum(weight.numel() for weight in session.net.parameters())
     digest = None
     if args.injection == "preclassified":
@@ -129,7 +112,8 @@ def finish(session, args):
 
 
 def main():
-    args = arguments()
+    args = arguments.parse()
+    args.out = args.folder / "runs" / args.run
     if args.threads:
         torch.set_num_threads(args.threads)
     shape = Shape(args.edge, args.filters, args.cap, args.levels, args.label)

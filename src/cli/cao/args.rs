@@ -11,6 +11,7 @@ use cao_model::fit::Fit;
 use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
+use cao_model::network::Label;
 use cao_model::occlusion::Quadrature;
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
@@ -415,6 +416,9 @@ pub struct Examples {
     /// Seed of everything that is random
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
+    /// Mean transmittance of the rays, or that at their ends; twice for both [default: both]
+    #[arg(long, value_name = "mean|end", value_parser = label)]
+    pub label: Vec<Label>,
     /// A built-in volume of random proportions, or `solids`, random solids; more often for more of them
     #[arg(long, value_name = "NAME")]
     pub builtin: Vec<String>,
@@ -423,6 +427,10 @@ pub struct Examples {
     pub volume: Vec<OsString>,
     #[command(flatten)]
     pub raw: Raw,
+}
+
+fn label(text: &str) -> Result<Label, String> {
+    Label::ALL.into_iter().find(|label| label.name() == text).ok_or_else(|| "expected mean or end".into())
 }
 
 #[derive(Args)]

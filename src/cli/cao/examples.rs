@@ -1,8 +1,8 @@
 //! `cao examples`: volumes, transfer functions and exact ambient values to train a network on, as files.
 //!
-//! Each example is a file of four cubes, one after the other, of edge³ numbers of 16 bits, little-endian, x fastest, 65535 for 1: opacity,
-//! label `mean`, label `end`, values. `examples.json` has edge, seed and what each example is of. In NumPy:
-//! `numpy.fromfile(name, "<u2").reshape(4, edge, edge, edge)`, axes z, y, x.
+//! `examples.u16` holds of each example some cubes of edge³ numbers of 16 bits, little-endian, x fastest, 65535 for 1; `examples.json` says
+//! which (opacity, labels, values), edge, seed, and what each example is of. In NumPy:
+//! `numpy.fromfile("examples.u16", "<u2").reshape(-1, cubes, edge, edge, edge)`, the last three z, y, x.
 
 use crate::args::{Examples, Global, usage};
 use anyhow::{Context, Result};
@@ -20,37 +20,54 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+const DATA: &str = "examples.u16";
 const INDEX: &str = "examples.json";
 
 pub fn run(global: &Global, args: &Examples) -> Result<ExitCode> {
     let mut progress = Progress::default();
     progress.stage("reading");
     let sources = sources(args)?;
-    let name = |i: usize| format!("{i:05}.u16");
-    let names = (0..args.count as usize).map(name).chain([INDEX.to_owned()]);
-    let targets = Targets::in_folder(&args.output, names)?;
+    let targets = Targets::in_folder(&args.output, [DATA, INDEX].map(str::to_owned))?;
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
-    let plan = Plan { edge: args.edge as usize, samples: args.samples as usize, seed: args.seed };
+    let labels = if args.label.is_empty() { Label::ALL.to_vec() } else { args.label.clone() };
+    let plan = Plan {
+        edge: args.edge as usize,
+        samples: args.samples as usize,
+        seed: args.seed,
+        labels: labels.clone(),
+    };
     let mut maker = Maker::new(&gpu, plan, sources)?;
     progress.stage("examples");
     let mut made = Vec::new();
-    let mut checked = Vec::new();
+    let mut checked: Vec<Vec<Errors>> = Vec::new();
     targets.write(|files| {
-        for i in 0..args.count as usize {
-            let example = maker.make(i)?;
-            files.write(&args.output.join(name(i)), |file| file.write_all(&bytes(&example)))?;
-            made.push(described(&name(i), &example));
-            checked.extend(example.errors);
-            progress.set((i + 1) as f64 / f64::from(args.count));
-        }
-        let info = gpu.info();
+        let mut failed = Ok(());
+        files.write(&args.output.join(DATA), |file| {
+            for i in 0..args.count {
+                match maker.make(i as usize) {
+                    Ok(example) => {
+                        file.write_all(&bytes(&example))?;
+                        made.push(described(&labels, &example));
+                        checked.extend((!example.errors.is_empty()).then_some(example.errors));
+                    }
+                    Err(error) => {
+                        failed = Err(error);
+                        break;
+                    }
+                }
+                progress.set(f64::from(i + 1) / f64::from(args.count));
+            }
+            Ok(())
+        })?;
+        failed?;
+        let cubes = ["opacity"].into_iter().chain(labels.iter().map(|label| label.name())).chain(["values"]);
         let index = json!({
             "program": format!("cao {}", env!("CARGO_PKG_VERSION")),
-            "device": info.name,
+            "device": gpu.info().name,
             "edge": args.edge, "samples": args.samples, "seed": args.seed, "radius": radius(args.edge as usize),
-            "cubes": ["opacity", "mean", "end", "values"],
+            "cubes": cubes.collect::<Vec<_>>(),
             "examples": made,
         });
         let text = serde_json::to_string_pretty(&index).context("the index is no JSON")?;
@@ -62,17 +79,16 @@ pub fn run(global: &Global, args: &Examples) -> Result<ExitCode> {
     out.device(&gpu);
     out.line(format!("examples  {} of {} voxels along each axis, seed {}", args.count, args.edge, args.seed));
     let mut stated = serde_json::Map::new();
-    for (k, label) in Label::ALL.into_iter().enumerate() {
+    for (k, label) in labels.into_iter().enumerate() {
         let worst = checked.iter().map(|errors| errors[k].rmse).fold(0.0, f64::max);
+        let (name, count) = (label.name(), checked.len());
         out.line(format!(
-            "  {:<7} off by at most {worst:.4} (root mean square) in {} that the reference checked",
-            label.name(),
-            checked.len()
+            "  {name:<7} off by at most {worst:.4} (root mean square) in the {count} that were checked"
         ));
-        stated.insert(label.name().into(), worst.into());
+        stated.insert(name.into(), worst.into());
     }
     out.json(json!({ "examples": args.count, "checked": checked.len(), "largest_rmse": stated }));
-    out.wrote(&args.output.join(INDEX));
+    targets.paths().iter().for_each(|path| out.wrote(path));
     out.finish()?;
     Ok(ExitCode::SUCCESS)
 }
@@ -100,18 +116,18 @@ fn sources(args: &Examples) -> Result<Vec<Source>> {
 }
 
 fn bytes(example: &Example) -> Vec<u8> {
-    let [mean, end] = &example.labels;
-    let cubes = [&example.opacity, mean, end, &example.values];
-    cubes.into_iter().flatten().flat_map(|value| value.to_le_bytes()).collect()
+    let cubes = [&example.opacity].into_iter().chain(&example.labels).chain([&example.values]);
+    cubes.flatten().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-fn described(file: &str, example: &Example) -> Value {
+fn described(labels: &[Label], example: &Example) -> Value {
     let of = |errors: &Errors| json!({ "rmse": errors.rmse, "bias": errors.bias, "voxels": errors.count });
+    let checked: serde_json::Map<String, Value> =
+        labels.iter().zip(&example.errors).map(|(label, errors)| (label.name().into(), of(errors))).collect();
     json!({
-        "file": file,
         "source": example.source,
         "given": example.given,
         "transfer": example.transfer,
-        "checked": example.errors.as_ref().map(|[mean, end]| json!({ "mean": of(mean), "end": of(end) })),
+        "off": checked,
     })
 }

@@ -28,6 +28,8 @@ pub struct Plan {
     pub samples: usize,
     /// Seed of everything.
     pub seed: u64,
+    /// What to compute.
+    pub labels: Vec<Label>,
 }
 
 /// An example.
@@ -41,12 +43,12 @@ pub struct Example {
     pub transfer: Vec<[f64; 2]>,
     /// Opacity, x fastest, 65535 for 1.
     pub opacity: Vec<u16>,
-    /// Labels as [`Label::ALL`] has them.
-    pub labels: [Vec<u16>; 2],
+    /// Labels, in the order of the plan's.
+    pub labels: Vec<Vec<u16>>,
     /// Values, 65535 for the largest of the volume.
     pub values: Vec<u16>,
-    /// Errors of the labels to the converged reference, of every fiftieth example.
-    pub errors: Option<[Errors; 2]>,
+    /// Errors of the labels to the converged reference, of every fiftieth example; empty of others.
+    pub errors: Vec<Errors>,
 }
 
 /// One in so many is checked by the reference.
@@ -91,7 +93,7 @@ impl<'a> Maker<'a> {
         let opacity: Vec<u16> = voxels.iter().map(|[opacity, _]| coded(*opacity)).collect();
         let mut labels = Vec::new();
         let mut errors = Vec::new();
-        for label in Label::ALL {
+        for &label in &self.plan.labels {
             let found = self.labels.of(label, &opacity)?;
             if i % CHECKED == 0 {
                 errors.push(self.labels.check(label, &opacity, &found)?);
@@ -104,8 +106,8 @@ impl<'a> Maker<'a> {
             transfer: transfer.iter().flat_map(Trapezoid::points).collect(),
             values: voxels.iter().map(|[_, value]| coded(*value)).collect(),
             opacity,
-            labels: labels.try_into().unwrap_or_default(),
-            errors: errors.try_into().ok(),
+            labels,
+            errors,
         })
     }
 
