@@ -108,9 +108,9 @@ pub fn candidates(
 ) -> Vec<Candidate> {
     let chosen = |entry: &&Entry| match method {
         Some(only) => entry.method == only,
-        // What one feature takes from another's light is no error of theirs, and histograms know no clip: such values are for who asks for
-        // them.
-        None if [Method::FeatureDriven, Method::Histograms].contains(&entry.method) => {
+        // What one feature takes from another's light is no error of theirs, histograms know no clip, and a network is as good as what it was
+        // trained on, off every front of the chart: such values are for who asks for them.
+        None if [Method::FeatureDriven, Method::Histograms, Method::Deep].contains(&entry.method) => {
             setup.method == entry.method
         }
         None => stands_for(entry.same_values_as, setup.method) == entry.method,
@@ -626,6 +626,12 @@ mod tests {
         assert!(all.iter().all(|c| c.occlusion.radius_mm == 7.0));
         assert_eq!(count(&all, Method::Cao), RaySet::ALL.len() * Quadrature::CAST.len());
         assert_eq!((count(&all, Method::Lao), count(&all, Method::Rays)), (0, 15));
+        // What only who asks for it gets.
+        for method in [Method::FeatureDriven, Method::Histograms, Method::Deep] {
+            assert_eq!(count(&all, method), 0, "{}", method.name());
+            assert!(count(&candidates(&setup, Some(method), None, None), method) > 0, "{}", method.name());
+            assert!(count(&candidates(&Setup { method, ..setup }, None, None, None), method) > 0, "{}", method.name());
+        }
         assert!(all.is_sorted_by_key(|c| c.occlusion.rays.count()), "the cheaper ones first");
         let lao = candidates(&Setup { method: Method::Lao, ..setup }, None, None, None);
         assert_eq!((count(&lao, Method::Cao), count(&lao, Method::Lao)), (0, 21));

@@ -10,9 +10,9 @@ use cao_model::occlusion::Quadrature;
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito 2008, their yellow darker, on white), in the order of the methods after "solid colour".
 /// Further ones are between them, or darker.
-const COLOURS: [&str; 14] = [
+const COLOURS: [&str; 15] = [
     "#cc79a7", "#222222", "#8f6f1b", "#0072b2", "#e69f00", "#d55e00", "#56b4e9", "#b8a800", "#009e73",
-    "#7a3b8f", "#a3c130", "#7b1e1e", "#2f4f8f", "#c0803f",
+    "#7a3b8f", "#a3c130", "#7b1e1e", "#2f4f8f", "#c0803f", "#5f9ea0",
 ];
 pub(super) const GREY: &str = "#777777";
 pub(super) const FRONT: &str = "#aaaaaa";

@@ -160,12 +160,35 @@ pub struct SceneChart {
     pub recomputed: f64,
     /// Each contender after each kind of change.
     pub points: Vec<Point>,
+    /// Who refused the scene or a change of it, and why.
+    pub left_out: Vec<LeftOut>,
     /// Median time of drawing both eyes, ms: method, time.
     pub draws: Vec<(&'static str, f64)>,
     /// What each method shows, and where it errs; of the first scene only.
     pub pictures: Vec<Shown>,
     /// The default method's picture, drawn in other ways.
     pub looks: Looks,
+}
+
+/// A contender that has no point, as it cannot have what it was asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Its setting.
+    pub setting: Setting,
+    /// After which change; `None` where it refused the scene.
+    pub change: Option<Change>,
+    /// In its words.
+    pub why: String,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { method, setting, change, why } = self;
+        let when = change.map_or(String::new(), |change| format!(" after {}", change.name()));
+        write!(f, "{method}, {}, has no point{when}: {why}.", setting.name())
+    }
 }
 
 /// What a reference is worth.
@@ -273,8 +296,7 @@ pub fn foresee(gpu: &Gpu, scenes: &[Scene], plan: &Plan) -> Result<Foreseen> {
     let Some(scene) = scenes.iter().min_by_key(|scene| scene.volume.len()) else {
         return Ok(Foreseen { minutes: 0.0, device_bytes: 0 });
     };
-    let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
-    let entries = contender::all(&asked);
+    let entries = contender::all(&asked(scene, plan));
     let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting)).ok_or_else(no_baseline)?;
     let views = scene.views(plan.size)?;
     let arena = Arena { gpu, volume: &scene.volume, views: &views, size: plan.size };
@@ -320,6 +342,11 @@ pub fn measure(
     })
 }
 
+fn asked(scene: &Scene, plan: &Plan) -> Asked {
+    let min_spacing = scene.volume.min_spacing();
+    Asked { min_spacing, radius: f64::from(scene.state.radius_mm) / min_spacing, quick: plan.quick }
+}
+
 /// Samples of rays, done and to do: for the time that is left.
 struct Work {
     done: f64,
@@ -356,8 +383,7 @@ impl Work {
         let voxel = scene.volume.min_spacing() as f32;
         let pictures =
             looks::work(voxel, &looks::settings(voxel, plan.quick), plan.runs) * Self::picture(plan);
-        let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
-        let entries = contender::all(&asked);
+        let entries = contender::all(&asked(scene, plan));
         let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting));
         // The baseline competes in every group.
         let groups = (entries.len() - 1).div_ceil(group(gpu, scene)) as f64;
@@ -397,11 +423,11 @@ fn one(
     }
     let (categories, recomputed) = stand.clip_shares()?;
 
-    let asked = Asked { min_spacing: scene.volume.min_spacing(), quick: plan.quick };
-    let mut entries = contender::all(&asked);
+    let mut entries = contender::all(&asked(scene, plan));
     let at = entries.iter().position(|e| is_baseline(e.method, &e.setting)).ok_or_else(no_baseline)?;
     let baseline = entries.remove(at);
     let mut points = Vec::new();
+    let mut left_out = Vec::new();
     let mut draws = Vec::new();
     let mut shown = Vec::new();
     let featured: Vec<(&str, Setting)> = match pictured {
@@ -413,13 +439,14 @@ fn one(
         let found = compete_in(scene, arena, plan, &compete, &truths, &featured, work, say)?;
         // The baseline's first runs stand for it.
         let own = usize::from(n > 0);
-        points.extend(found.0.into_iter().skip(own * Change::ALL.len()));
-        for (method, ms) in found.1 {
+        points.extend(found.points.into_iter().skip(own * Change::ALL.len()));
+        left_out.extend(found.left_out);
+        for (method, ms) in found.draws {
             if !draws.iter().any(|(known, _)| *known == method) {
                 draws.push((method, ms));
             }
         }
-        shown.extend(found.2);
+        shown.extend(found.shown);
     }
     let looks = looks_of(gpu, scene, plan, work, say)?;
     shown.sort_by_key(|shown| contender::place(shown.method));
@@ -435,6 +462,7 @@ fn one(
         categories,
         recomputed,
         points,
+        left_out,
         draws,
         pictures: shown,
         looks,
@@ -470,9 +498,27 @@ fn no_baseline() -> Error {
     Error::refused("chart", format!("no contender is {BASELINE} with 26 rays"))
 }
 
-/// The points of each contender for all changes, contender by contender; the draw times of each method's first; pictures of those that are
-/// featured.
-type Found = (Vec<Point>, Vec<(&'static str, f64)>, Vec<Shown>);
+/// What a group found.
+struct Found {
+    /// Of each contender for all changes, contender by contender.
+    points: Vec<Point>,
+    left_out: Vec<LeftOut>,
+    /// Draw times of each method's first.
+    draws: Vec<(&'static str, f64)>,
+    /// Of those that are featured.
+    shown: Vec<Shown>,
+}
+
+/// What was done, or why a setting that a method cannot have was refused; other errors are errors. The baseline has to have all.
+fn unless_refused<T>(done: Result<T>, baseline: bool) -> Result<Result<T, String>> {
+    match done {
+        Ok(done) => Ok(Ok(done)),
+        Err(error) if !baseline && matches!(error.of_data(), Some(cao_model::Error::Config { .. })) => {
+            Ok(Err(error.to_string()))
+        }
+        Err(error) => Err(error),
+    }
+}
 
 #[expect(clippy::too_many_arguments, reason = "what competes, on what, and who listens, each named once")]
 fn compete_in(
@@ -486,24 +532,41 @@ fn compete_in(
     say: &mut dyn FnMut(&str, &Work),
 ) -> Result<Found> {
     say("preparing", work);
-    let mut open: Vec<Box<dyn Contender + '_>> = Vec::new();
-    for entry in entries {
-        open.push((entry.open)(arena, &scene.state)?);
+    let mut left_out = Vec::new();
+    let out = |entry: &Entrant, change, why| {
+        let (method, setting) = (entry.method, entry.setting.clone());
+        LeftOut { method, setting, change, why }
+    };
+    let mut open: Vec<(&Entrant, Box<dyn Contender + '_>)> = Vec::new();
+    for (n, &entry) in entries.iter().enumerate() {
+        match unless_refused((entry.open)(arena, &scene.state), n == 0)? {
+            Ok(contender) => open.push((entry, contender)),
+            Err(why) => left_out.push(out(entry, None, why)),
+        }
         work.done += Work::update(scene, entry);
         say("preparing", work);
     }
-    let mut points: Vec<Vec<Point>> = entries.iter().map(|_| Vec::new()).collect();
+    let mut points: Vec<Vec<Point>> = open.iter().map(|_| Vec::new()).collect();
     for (change, truth) in Change::ALL.into_iter().zip(truths) {
         let states = [&scene.after(change), &scene.state];
+        let mut refused = vec![false; open.len()];
         // Back and forth; the first run warms up, and its values are those that are held to the reference.
         for run in 0..=plan.runs as usize {
             let mut of_baseline = f64::NAN;
-            for (n, (entry, contender)) in entries.iter().zip(&mut open).enumerate() {
-                if !entry.has_values {
+            for (n, (entry, contender)) in open.iter_mut().enumerate() {
+                if !entry.has_values || refused[n] {
                     continue;
                 }
                 say(change.name(), work);
-                let stages = contender.update(change, states[run % 2])?;
+                let stages = match unless_refused(contender.update(change, states[run % 2]), n == 0)? {
+                    Ok(stages) => stages,
+                    // It stays as it was, which is what the next change begins with.
+                    Err(why) => {
+                        left_out.push(out(entry, Some(change), why));
+                        refused[n] = true;
+                        continue;
+                    }
+                };
                 work.done += Work::update(scene, entry);
                 // The sum of nothing is -0.
                 let total_ms = 0.0 + stages.total();
@@ -524,15 +587,15 @@ fn compete_in(
         }
         // An even number of runs ends where the change leads to.
         if plan.runs.is_multiple_of(2) {
-            for contender in &mut open {
+            for (_, contender) in &mut open {
                 contender.update(change, &scene.state)?;
             }
         }
     }
     let mut draws = Vec::new();
     let look = Look::default();
-    for (n, (entry, contender)) in entries.iter().zip(&open).enumerate() {
-        if entries[..n].iter().any(|other| other.method == entry.method) {
+    for (n, (entry, contender)) in open.iter().enumerate() {
+        if open[..n].iter().any(|(other, _)| other.method == entry.method) {
             continue;
         }
         let mut times = Vec::new();
@@ -542,14 +605,14 @@ fn compete_in(
         draws.push((entry.method, front::quartiles(times.into_iter())[1]));
     }
     let mut shown = Vec::new();
-    for (entry, contender) in entries.iter().zip(&open) {
+    for (entry, contender) in &open {
         if featured.iter().any(|(method, setting)| *method == entry.method && *setting == entry.setting) {
             let (image, _) = contender.draw(&look)?;
             let found = entry.has_values.then(|| contender.ambient()).transpose()?;
             shown.push(truths[0].shown(&scene.grid(), entry, &image, found.as_ref()));
         }
     }
-    Ok((points.into_iter().flatten().collect(), draws, shown))
+    Ok(Found { points: points.into_iter().flatten().collect(), left_out, draws, shown })
 }
 
 /// The scene without any contender: what there is to see, and the truth about it.
@@ -712,6 +775,9 @@ impl Chart {
                 "{}: {x} x {y} x {z} voxels, radius {} mm, clip {}; errors at {} of {} voxels that show, or at {} points of the surface.",
                 scene.name, scene.radius_mm, scene.clips, truth.computed, truth.counting, truth.surface
             ));
+        }
+        for scene in &self.scenes {
+            lines.extend(scene.left_out.iter().map(|out| format!("{}: {out}", scene.name)));
         }
         let worst = self.scenes.iter().flat_map(|s| &s.references).map(|(_, t)| t.convergence);
         let reference = self.plan.reference;

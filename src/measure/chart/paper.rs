@@ -234,6 +234,7 @@ pub fn measure(
             categories,
             recomputed,
             points,
+            left_out: Vec::new(),
             draws,
             pictures: Vec::new(),
             looks: nothing,

@@ -106,7 +106,8 @@ pub(super) fn table_1(chart: &Chart) -> String {
                     marks.filter(|m| m.of.method == mark.of.method && m.of.setting == mark.of.setting);
                 match own.next() {
                     Some(m) if m.time[1] > 0.0 => time(chart, m.time),
-                    _ => "no cost".into(),
+                    Some(_) => "no cost".into(),
+                    None => "refused".into(),
                 }
             };
             let shape = mean(&scenes, mark, &|p| Some(p.shape.rmse));

@@ -12,8 +12,8 @@ pub struct Listed {
     pub method: Method,
     /// What an update computes.
     pub computes: &'static str,
-    /// Cost of a ray in rays cast from every voxel.
-    pub ray: f64,
+    /// Cost of a ray in rays cast from every voxel, told R in voxels.
+    pub ray: fn(f64) -> f64,
     /// Its ray sets for a first look: the cheapest and the dearest, and those of the default size.
     pub few: &'static [RaySet],
     /// Whether such values are means over half the sphere: 1 at a flat wall, where the others and the reference have about ½. Errors are
@@ -58,7 +58,7 @@ impl Listed {
             setting.details += ", halved";
         }
         setting.label = with_options(setting.label, &setup.options);
-        let work = self.ray * occlusion.rays.count().max(1) as f64;
+        let work = (self.ray)(asked.radius) * occlusion.rays.count().max(1) as f64;
         rendered::entrant(name, setup, setting, work, if half_sphere { HALF_SPHERE } else { 1.0 })
     }
 }

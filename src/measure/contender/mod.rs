@@ -5,6 +5,7 @@
 //! have ambient values joins by one file here and its line there: a function that lists its settings as [`Entrant`]s, each of
 //! which opens a [`Contender`].
 
+mod deep;
 mod image_space;
 mod listed;
 mod paper;
@@ -26,7 +27,7 @@ use listed::Listed;
 
 /// Everything that competes, in the order of the legend. The share of the voxels that a scene usually needs, and the share recomputed
 /// for a change, are a fifth each (method.md §5).
-static CONTENDERS: [Kind; 15] = [
+static CONTENDERS: [Kind; 16] = [
     Kind { name: SOLID, enters: Enters::By(solid::entrants) },
     Kind { name: PHONG, enters: Enters::By(solid::phong) },
     Kind { name: "image space", enters: Enters::By(image_space::entrants) },
@@ -36,7 +37,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::FeatureDriven,
             computes: "bricks that show and changed, of each feature",
-            ray: 0.08,
+            ray: |_| 0.08,
             few: &[RaySet::Spiral(50)],
             half_sphere: |_| false,
         }),
@@ -46,7 +47,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Lao,
             computes: "voxels that show recomputed",
-            ray: 0.2,
+            ray: |_| 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
             half_sphere: |_| false,
         }),
@@ -57,7 +58,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Cao,
             computes: "voxels that show and changed",
-            ray: 0.2,
+            ray: |_| 0.2,
             few: &[RaySet::R6, RaySet::R26, RaySet::W26, RaySet::W50],
             half_sphere: |_| false,
         }),
@@ -67,7 +68,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Spao,
             computes: "levels anew, bricks that show and changed",
-            ray: 1.0,
+            ray: |_| 1.0,
             few: &[RaySet::None],
             half_sphere: |options| options.normal > 0.0,
         }),
@@ -77,7 +78,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Cones,
             computes: "levels anew, bricks that show and changed",
-            ray: 0.1,
+            ray: |_| 0.1,
             few: &[RaySet::W14, RaySet::W26],
             half_sphere: |_| false,
         }),
@@ -87,7 +88,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Rays,
             computes: "bricks that show and changed",
-            ray: 0.05,
+            ray: |_| 0.05,
             few: &[RaySet::Spiral(14), RaySet::Spiral(50), RaySet::Spiral(96)],
             half_sphere: |_| false,
         }),
@@ -97,7 +98,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Sat,
             computes: "whole table, bricks that show and changed",
-            ray: 0.05,
+            ray: |_| 0.05,
             few: &[RaySet::None],
             half_sphere: |_| false,
         }),
@@ -107,7 +108,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Shells,
             computes: "whole table, bricks that show and changed",
-            ray: 0.05,
+            ray: |_| 0.05,
             few: &[RaySet::None],
             half_sphere: |_| false,
         }),
@@ -117,7 +118,7 @@ static CONTENDERS: [Kind; 15] = [
         enters: Enters::As(Listed {
             method: Method::Vicinity,
             computes: "bricks that show and changed",
-            ray: 0.05,
+            ray: |_| 0.05,
             few: &[RaySet::W50],
             half_sphere: |_| true,
         }),
@@ -128,8 +129,19 @@ static CONTENDERS: [Kind; 15] = [
             method: Method::Histograms,
             computes: "12 voxels at most, as if nothing were clipped; new values cluster anew",
             // A hundred rays of every voxel, where values or radius are new.
-            ray: 100.0,
+            ray: |_| 100.0,
             // Not for a first look, which is to take less than two minutes on a software driver.
+            few: &[],
+            half_sphere: |_| false,
+        }),
+    },
+    Kind {
+        name: "DVAO",
+        enters: Enters::As(Listed {
+            method: Method::Deep,
+            computes: "the whole network",
+            ray: deep::ray,
+            // Nor is this one.
             few: &[],
             half_sphere: |_| false,
         }),
@@ -208,6 +220,8 @@ pub fn place(name: &str) -> usize {
 pub struct Asked {
     /// Smallest spacing of the volume in mm.
     pub min_spacing: f64,
+    /// R in such spacings.
+    pub radius: f64,
     /// Only enough settings for a first look?
     pub quick: bool,
 }
@@ -342,7 +356,7 @@ mod tests {
     use cao_model::METHODS;
 
     fn entrants(quick: bool) -> Vec<Entrant> {
-        all(&Asked { min_spacing: 1.0, quick })
+        all(&Asked { min_spacing: 1.0, radius: 8.0, quick })
     }
 
     #[test]
@@ -383,21 +397,22 @@ mod tests {
                 "SAT",
                 "shells",
                 "vicinity",
-                "histograms"
+                "histograms",
+                "DVAO"
             ]
         );
         let listed: Vec<_> = METHODS.iter().map(|e| name(e.method)).collect();
         assert_eq!(
             listed,
-            ["SAT", "shells", "vicinity", "histograms", "fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
+            ["SAT", "shells", "vicinity", "histograms", "DVAO", "fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
         );
         assert_eq!(names.map(place), std::array::from_fn(|place| place));
     }
 
     #[test]
     fn every_kind_has_its_settings_and_no_two_are_the_same() {
-        let quick = [1, 1, 1, 4, 2, 8, 2, 8, 3, 2, 6, 1, 4, 1, 0];
-        let full = [1, 1, 3, 4, 3, 21, 4, 21, 6, 2, 15, 1, 12, 3, 1];
+        let quick = [1, 1, 1, 4, 2, 8, 2, 8, 3, 2, 6, 1, 4, 1, 0, 0];
+        let full = [1, 1, 3, 4, 3, 21, 4, 21, 6, 2, 15, 1, 12, 3, 1, 1];
         for (quick, counts) in [(true, quick), (false, full)] {
             let entrants = entrants(quick);
             for (i, a) in entrants.iter().enumerate() {
