@@ -630,7 +630,11 @@ mod tests {
         for method in [Method::FeatureDriven, Method::Histograms, Method::Deep] {
             assert_eq!(count(&all, method), 0, "{}", method.name());
             assert!(count(&candidates(&setup, Some(method), None, None), method) > 0, "{}", method.name());
-            assert!(count(&candidates(&Setup { method, ..setup }, None, None, None), method) > 0, "{}", method.name());
+            assert!(
+                count(&candidates(&Setup { method, ..setup }, None, None, None), method) > 0,
+                "{}",
+                method.name()
+            );
         }
         assert!(all.is_sorted_by_key(|c| c.occlusion.rays.count()), "the cheaper ones first");
         let lao = candidates(&Setup { method: Method::Lao, ..setup }, None, None, None);

@@ -3,8 +3,8 @@
 
 use cao_measure::stability::{
     Effort, Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
-    mip_blocks, motion, noise, numbers, pixels, radius, shape, sheets, shells, stacked_layers, stereo,
-    tables, thin_sheets, views,
+    mip_blocks, motion, network, noise, numbers, pixels, radius, shape, sheets, shells, stacked_layers,
+    stereo, tables, thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -346,4 +346,22 @@ fn cones_are_wrong_about_thin_sheets_on_either_side() {
     assert_shown(&finding);
     let cones = curve(&finding, 0, "cones, 26w");
     assert!(cones.at(11.0) < -0.4 && cones.at(12.0) > 0.4, "{}", finding.sentence);
+}
+
+/// What it is off by is the weights'; that rays are not, and that what a cut changes ends at their ends, is not.
+#[test]
+fn a_network_errs_on_what_it_was_not_trained_on_and_rays_do_not() {
+    let plan = network::Plan {
+        spacings: vec![8.0],
+        angles: vec![45.0],
+        kinds: 1,
+        cuts: vec![0.5],
+        ..network::Plan::of(Effort::Quick)
+    };
+    let finding = network::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    println!("{}", finding.sentence);
+    let beyond = finding.charts.len() - 1;
+    assert_eq!(curve(&finding, beyond, "rays").largest(), 0.0);
+    assert!(curve(&finding, beyond, "network").largest() > 1e-4, "{}", finding.sentence);
 }

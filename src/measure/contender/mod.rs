@@ -404,7 +404,19 @@ mod tests {
         let listed: Vec<_> = METHODS.iter().map(|e| name(e.method)).collect();
         assert_eq!(
             listed,
-            ["SAT", "shells", "vicinity", "histograms", "DVAO", "fdAO", "SPAO", "cones", "LAO", "CAO", "rays"]
+            [
+                "SAT",
+                "shells",
+                "vicinity",
+                "histograms",
+                "DVAO",
+                "fdAO",
+                "SPAO",
+                "cones",
+                "LAO",
+                "CAO",
+                "rays"
+            ]
         );
         assert_eq!(names.map(place), std::array::from_fn(|place| place));
     }

@@ -15,6 +15,7 @@ pub mod layers;
 pub mod map;
 pub mod mip_blocks;
 pub mod motion;
+pub mod network;
 pub mod noise;
 pub mod numbers;
 pub mod page;
@@ -199,7 +200,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 22] = [
+pub const TRIALS: [Trial; 23] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -309,6 +310,11 @@ pub const TRIALS: [Trial; 22] = [
         name: "thin-sheets",
         title: "How wrong are cones about sheets that are thinner than they are wide?",
         run: |_, effort, progress| thin_sheets::run(&thin_sheets::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "network",
+        title: "How wrong is a network about what it was not trained on?",
+        run: |_, effort, progress| network::run(&network::Plan::of(effort), progress),
     },
 ];
 
