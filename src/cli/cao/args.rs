@@ -114,6 +114,7 @@ Examples:
   cao chart scene.toml builtin:fruit:96 --runs 9 -o chart
   cao chart --fdao -o features            feature-driven occlusion beside the printed
                                           times, with its pictures
+  cao chart --dvao -o network             a network beside rays, Table 3 of its paper
 
 Writes report.html, which stands alone; chart.svg, chart.png and runs.csv, every
 run of every method; the same of the picture's own settings, pictures.*. A scene without clips gets a ball.";
@@ -364,6 +365,9 @@ pub struct Chart {
     /// The scenes, tables and pictures of the paper of method fdao instead: what features cost, and what they show
     #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm", "paper"])]
     pub fdao: bool,
+    /// Table 3 of the paper of method dvao instead: its network beside rays, with likeness, time and memory
+    #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm", "paper", "fdao"])]
+    pub dvao: bool,
     /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms
     #[arg(long, value_name = "FILE", requires = "paper")]
     pub data: Vec<OsString>,

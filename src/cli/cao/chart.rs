@@ -12,6 +12,7 @@ use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
 use cao_model::error::shown_path;
+use cao_model::network::Label;
 use serde_json::json;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -46,6 +47,9 @@ const PAPER: [&str; 10] = [
 /// What `--fdao` writes.
 const FDAO: [&str; 5] = ["features.html", "features.csv", "figure-1.png", "figure-3.png", "figure-4.png"];
 
+/// What `--dvao` writes.
+const DVAO: [&str; 3] = ["network.html", "network.csv", "figure-8.png"];
+
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
@@ -56,6 +60,9 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     }
     if args.fdao {
         return fdao(global, args);
+    }
+    if args.dvao {
+        return dvao(global, args);
     }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
@@ -190,6 +197,48 @@ fn fdao(global: &Global, args: &Args) -> Result<ExitCode> {
     for line in found.caption().into_iter().skip(1).chain(found.ratios()) {
         out.line(line);
     }
+    for path in targets.paths() {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `--dvao`.
+fn dvao(global: &Global, args: &Args) -> Result<ExitCode> {
+    let targets = Targets::in_folder(&args.output, DVAO.map(str::to_owned))?;
+    let mut progress = Progress::default();
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let plan = chart::deep::Plan::of(&gpu, args.quick, args.runs);
+    let network = cao::network::small();
+    progress.stage("measuring");
+    let found = chart::deep::measure(&gpu, &network, &plan, &mut |what, share| {
+        progress.say(what);
+        progress.set(share);
+    })?;
+    check_validation(&gpu)?;
+    progress.stage("writing");
+    let (_, picture) = &found.figure;
+    let page = found.html(&machine(), &command())?;
+    targets.write_all(&[page.into_bytes(), found.runs().into_bytes(), picture.png()?])?;
+    drop(progress);
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    for line in found.caption().into_iter().skip(1).chain(found.lines()) {
+        out.line(line);
+    }
+    let rows: Vec<_> = Label::ALL
+        .into_iter()
+        .flat_map(|label| found.means(label).into_iter().map(move |row| (label, row)))
+        .map(|(label, (of, [ssim, mse], [ms, bytes]))| {
+            json!({
+                "truth": label.name(), "method": of.name(), "printed": of.printed(),
+                "ssim3d": ssim, "mse": mse, "ms": ms, "bytes": bytes
+            })
+        })
+        .collect();
+    out.json(json!({ "edge": plan.edge, "rows": rows }));
     for path in targets.paths() {
         out.wrote(path);
     }

@@ -1,8 +1,8 @@
 //! What [`super::features`] found as a page that stands alone and as comma-separated values, the printed numbers (fdAO Tables 2 and 3) beside ours.
 
 use super::features::{Found, SceneFound};
-use super::report::{data, page, section};
-use super::tables::{escaped, table};
+use super::report::{figures, head, page, section};
+use super::tables::table;
 use crate::Result;
 use std::fmt::Write as _;
 
@@ -120,17 +120,8 @@ impl Found {
     /// # Errors
     /// [`cao_model::Error::Config`] where a picture cannot be encoded.
     pub fn html(&self, machine: &str, command: &str) -> Result<String> {
-        let mut body =
-            String::from("<h1>Feature-driven ambient occlusion: the paper's tables and pictures</h1>\n");
-        let _ = writeln!(
-            body,
-            "<p class=\"small\">{}; command: <code>{}</code></p>",
-            escaped(machine),
-            escaped(command)
-        );
-        for line in self.caption() {
-            let _ = writeln!(body, "<p class=\"small\">{}</p>", escaped(&line));
-        }
+        let title = "Feature-driven ambient occlusion: the paper's tables and pictures";
+        let mut body = head(title, machine, command, &self.caption());
         body += &section(
             "What features cost",
             "Table 2 of the paper (GeForce GTX 295, R = 16, every voxel, without bricks), and ours: AO is rays, fdAO by each rule. The paper casts all rays once \
@@ -145,14 +136,8 @@ impl Found {
         );
         body += &self.table_3();
         body += &section("Pictures", "By the paper's numbers; left eye.");
-        for (number, shows, picture) in &self.figures {
-            let _ = writeln!(
-                body,
-                "<p><img style=\"max-width: 100%\" alt=\"figure {number}\" src=\"{}\"></p>\n<p class=\"small\">Fig. {number}, {}</p>",
-                data(&picture.png()?),
-                escaped(shows)
-            );
-        }
+        let shown = self.figures.iter().map(|(number, shows, picture)| (*number, shows.as_str(), picture));
+        body += &figures(shown, "max-width: 100%")?;
         Ok(page("cao chart --fdao", &body))
     }
 

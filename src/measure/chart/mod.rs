@@ -6,6 +6,8 @@
 //! driver as ratios to the baseline of the same run.
 
 pub mod csv;
+pub mod deep;
+mod deep_page;
 pub mod draw;
 pub mod features;
 mod features_page;

@@ -7,8 +7,8 @@
 
 use super::looks::{Apart, Looks};
 use super::montage::{CROP, beside, crop, most_different};
-use super::report::{data, inline, page, section};
-use super::tables::{self, escaped};
+use super::report::{figures, head, inline, page, section};
+use super::tables;
 use super::{Chart, Point, Run, Scene, SceneChart, VOXEL, front};
 use crate::contender::{self, Arena, BASELINE, Change, Contender, State};
 use crate::error::errors;
@@ -29,7 +29,6 @@ use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
 use glam::Vec3;
-use std::fmt::Write as _;
 use std::sync::Arc;
 
 /// How much is measured.
@@ -445,16 +444,7 @@ impl Paper {
     /// # Errors
     /// [`cao_model::Error::Config`] where a picture cannot be encoded.
     pub fn html(&self, machine: &str, command: &str) -> Result<String> {
-        let mut body = String::from("<h1>The paper's scenes</h1>\n");
-        let _ = writeln!(
-            body,
-            "<p class=\"small\">{}; command: <code>{}</code></p>",
-            escaped(machine),
-            escaped(command)
-        );
-        for line in self.caption() {
-            let _ = writeln!(body, "<p class=\"small\">{}</p>", escaped(&line));
-        }
+        let mut body = head("The paper's scenes", machine, command, &self.caption());
         body += &section("What a clip makes recompute", "Table 2 of the paper, and ours.");
         body += &tables::table_2(&self.chart);
         body += &section("Frame rates while the clip moves", "Table 3 of the paper, and ours.");
@@ -462,14 +452,8 @@ impl Paper {
         body += &section("What a frame is spent on", "As the paper's Fig. 9, both eyes.");
         body += &inline(&tables::figure_9(&self.chart));
         body += &section("Pictures", "By the paper's numbers; under ambient light alone, left eye.");
-        for (number, shows, picture) in &self.figures {
-            let _ = writeln!(
-                body,
-                "<p><img style=\"max-width: 100%; image-rendering: pixelated\" alt=\"figure {number}\" src=\"{}\"><br>Fig. {number}, {}</p>",
-                data(&picture.png()?),
-                escaped(shows)
-            );
-        }
+        let shown = self.figures.iter().map(|(number, shows, picture)| (*number, shows.as_str(), picture));
+        body += &figures(shown, "max-width: 100%; image-rendering: pixelated")?;
         Ok(page("cao chart --paper", &body))
     }
 }

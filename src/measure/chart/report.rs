@@ -9,6 +9,7 @@ use super::{Change, Chart};
 use crate::Result;
 use crate::contender::SOLID;
 use crate::plot::{Drawing, short};
+use cao_formats::Picture;
 use std::fmt::Write as _;
 
 const STYLE: &str = "
@@ -31,16 +32,8 @@ details summary { cursor: pointer }
 /// [`cao_model::Error::Config`] where a picture cannot be encoded.
 pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) -> Result<String> {
     let every: Vec<_> = chart.scenes.iter().collect();
-    let mut body = String::from("<h1>Ambient occlusion after a change: time against error</h1>\n");
-    let _ = writeln!(
-        body,
-        "<p class=\"small\">{}; command: <code>{}</code></p>",
-        escaped(machine),
-        escaped(command)
-    );
-    for line in chart.caption() {
-        let _ = writeln!(body, "<p class=\"small\">{}</p>", escaped(&line));
-    }
+    let mut body =
+        head("Ambient occlusion after a change: time against error", machine, command, &chart.caption());
     body += &section("The chart", "");
     body += &inline(&draw::draw(chart, &every, &[]));
     if every.len() > 1 {
@@ -100,6 +93,40 @@ pub(super) fn section(title: &str, says: &str) -> String {
     format!("<h2>{}</h2>\n{says}", escaped(title))
 }
 
+/// What a page begins with.
+pub(super) fn head(title: &str, machine: &str, command: &str, caption: &[String]) -> String {
+    let mut html = format!(
+        "<h1>{}</h1>\n<p class=\"small\">{}; command: <code>{}</code></p>\n",
+        escaped(title),
+        escaped(machine),
+        escaped(command)
+    );
+    for line in caption {
+        let _ = writeln!(html, "<p class=\"small\">{}</p>", escaped(line));
+    }
+    html
+}
+
+/// Pictures of a paper by its numbers, each with what it shows; `style` is of the pictures.
+///
+/// # Errors
+/// [`cao_model::Error::Config`] where a picture cannot be encoded.
+pub(super) fn figures<'a>(
+    figures: impl IntoIterator<Item = (u32, &'a str, &'a Picture)>,
+    style: &str,
+) -> Result<String> {
+    let mut html = String::new();
+    for (number, shows, picture) in figures {
+        let _ = writeln!(
+            html,
+            "<p><img style=\"{style}\" alt=\"figure {number}\" src=\"{}\"></p>\n<p class=\"small\">Fig. {number}, {}</p>",
+            data(&picture.png()?),
+            escaped(shows)
+        );
+    }
+    Ok(html)
+}
+
 /// A drawing inside the page, where SVG needs no name space.
 pub(super) fn inline(drawing: &Drawing) -> String {
     let svg = drawing.svg().replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
@@ -156,7 +183,7 @@ fn figure(shown: &Shown, drawing: Option<(f64, f64)>) -> Result<String> {
 }
 
 /// A PNG as a data URI (RFC 2397).
-pub(super) fn data(png: &[u8]) -> String {
+fn data(png: &[u8]) -> String {
     format!("data:image/png;base64,{}", base64(png))
 }
 
