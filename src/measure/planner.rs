@@ -108,8 +108,8 @@ pub fn candidates(
 ) -> Vec<Candidate> {
     let chosen = |entry: &&Entry| match method {
         Some(only) => entry.method == only,
-        // What one feature takes from another's light is no error of theirs, histograms know no clip, and a network is as good as what it was
-        // trained on, off every front of the chart: such values are for who asks for them.
+        // What one feature takes from another's light is no error of theirs, histograms know no clip, and a network takes longer than rays that
+        // err a tenth as much (`cao chart --dvao`) and errs more on what it was not trained on: such values are for who asks for them.
         None if [Method::FeatureDriven, Method::Histograms, Method::Deep].contains(&entry.method) => {
             setup.method == entry.method
         }

@@ -337,6 +337,9 @@ fn summary(out: &mut Out, chart: &Chart) {
             ));
         }
     }
+    for scene in &chart.scenes {
+        scene.left_out.iter().for_each(|left_out| out.line(format!("{}: {left_out}", scene.name)));
+    }
     let looks: Vec<&Looks> = chart.scenes.iter().map(|scene| &scene.looks).collect();
     let marks = looks::marks(&looks, ratios);
     out.line(format!("picture: Pareto front by FLIP, ray cast in {unit}"));
@@ -371,7 +374,16 @@ fn summary(out: &mut Out, chart: &Chart) {
             })
         })
         .collect();
-    out.json(
-        json!({ "quoted_as": if ratios { "ratio" } else { "ms" }, "points": points, "pictures": pictures }),
-    );
+    let left_out = chart.scenes.iter().flat_map(|scene| scene.left_out.iter().map(move |out| (scene, out)));
+    let left_out: Vec<_> = left_out
+        .map(|(scene, out)| {
+            json!({
+                "scene": scene.name, "method": out.method, "setting": out.setting.name(),
+                "change": out.change.map(Change::name), "why": out.why
+            })
+        })
+        .collect();
+    out.json(json!({
+        "quoted_as": if ratios { "ratio" } else { "ms" }, "points": points, "left_out": left_out, "pictures": pictures
+    }));
 }

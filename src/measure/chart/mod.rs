@@ -801,3 +801,28 @@ impl Chart {
         lines
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_method_cannot_have_leaves_it_out_and_what_is_broken_does_not() {
+        let refused = || Err::<(), _>(Error::refused("radius", "is 1 mm"));
+        assert_eq!(unless_refused(Ok(3), true).unwrap(), Ok(3));
+        let why = unless_refused(refused(), false).unwrap().unwrap_err();
+        assert!(why.contains("radius") && why.contains("is 1 mm"), "{why}");
+        assert!(unless_refused(refused(), true).is_err(), "the baseline was left out");
+        let limit = cao_model::Error::Limit { what: "x".into(), needed: 2, limit: 1, hint: "less".into() };
+        assert!(
+            unless_refused(Err::<(), _>(limit.into()), false).is_err(),
+            "a limit was taken for a refusal"
+        );
+        let setting = Setting { label: "network".into(), quadrature: None, details: String::new() };
+        let change = Some(Change::Radius);
+        let told = LeftOut { method: "DVAO", setting: setting.clone(), change, why: why.clone() }.to_string();
+        assert_eq!(told, format!("DVAO, network, has no point after radius changed: {why}."));
+        let told = LeftOut { method: "DVAO", setting, change: None, why: why.clone() }.to_string();
+        assert_eq!(told, format!("DVAO, network, has no point: {why}."));
+    }
+}

@@ -4,11 +4,11 @@
 
 use cao_model::network::Shape;
 
-/// A voxel of the grid in samples of rays, with the net that is shipped: on a software driver 2.5 s of 64³ voxels, where a sample takes some 10 ns.
-const VOXEL: f64 = 1000.0;
+/// A voxel of the grid in samples of rays, with the net that is shipped: 300 on a software driver, and for edges that are rounded up to multiples of 32
+/// half as much again.
+const VOXEL: f64 = 450.0;
 
-/// Cost in rays cast from every voxel, of R voxels each: (radius of the net / R)³ voxels of the grid for one of the volume. Edges of grids are multiples
-/// of 32, which is not known here.
+/// Cost in rays cast from every voxel, of R voxels each: (radius of the net / R)³ voxels of the grid for one of the volume.
 pub fn ray(radius: f64) -> f64 {
     let grid = (f64::from(Shape::SMALL.radius()) / radius.max(1.0)).powi(3);
     VOXEL * grid / radius.max(1.0)

@@ -52,12 +52,12 @@ impl Plan {
                 edge: 64,
                 voxels: 500,
                 directions: 300,
-                scales: vec![0.05, 0.1, 0.2, 0.4, 0.7, 1.0],
-                fills: vec![0.01, 0.03, 0.1, 0.3, 0.6, 0.9],
+                scales: vec![0.05, 0.1, 0.2, 0.5, 1.0],
+                fills: vec![0.01, 0.03, 0.1, 0.3, 0.9],
                 spacings: vec![1.0, 2.0, 4.0, 8.0],
-                angles: super::evenly(0.0, 90.0, 7),
+                angles: vec![0.0, 30.0, 60.0, 90.0],
                 kinds: KINDS.len(),
-                cuts: vec![0.1, 0.25, 0.4, 0.55],
+                cuts: vec![0.1, 0.25, 0.5],
             },
             Effort::Quick => Self {
                 edge: 32,
@@ -65,10 +65,10 @@ impl Plan {
                 directions: 150,
                 scales: vec![0.05, 1.0],
                 fills: vec![0.01, 0.9],
-                spacings: vec![1.0, 8.0],
-                angles: vec![0.0, 45.0],
-                kinds: 2,
-                cuts: vec![0.25, 0.5],
+                spacings: vec![8.0],
+                angles: vec![45.0],
+                kinds: 1,
+                cuts: vec![0.5],
             },
         }
     }
@@ -280,28 +280,27 @@ impl Stand {
         })
     }
 
-    /// Largest change by a cut of values that no ray from there can know of: of rays and of the net.
-    fn beyond(&self, whole: &Scene, share: f64, voxels: usize) -> [f64; 2] {
+    /// Largest change by a cut of values that no ray from there can know of: of rays and of the net, whose values of the whole are `before`.
+    fn beyond(&self, whole: &Scene, before: &[f32], share: f64, voxels: usize) -> [f64; 2] {
         let cut = whole.clone().cut(share);
-        let edge = whole.grid.dims[0] as f64;
-        let far = share * edge + f64::from(self.radius) + 2.0;
+        let far = share * whole.grid.dims[0] as f64 + f64::from(self.radius) + 2.0;
         let mut voxels = cut.some(8 * voxels);
         voxels.retain(|i| whole.grid.voxel(*i)[0] as f64 > far);
         let most =
-            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max);
-        let net = [whole, &cut].map(|scene| {
-            let all = self.net(scene);
-            voxels.iter().map(|i| all[*i]).collect::<Vec<_>>()
-        });
-        let rays = [whole, &cut].map(|scene| self.rays(scene, &voxels));
-        [most(&rays[0], &rays[1]), most(&net[0], &net[1])]
+            |changes: &mut dyn Iterator<Item = f32>| changes.fold(0.0, |a, b| f64::from(b.abs()).max(a));
+        let [a, b] = [whole, &cut].map(|scene| self.rays(scene, &voxels));
+        let after = self.net(&cut);
+        [
+            most(&mut a.iter().zip(&b).map(|(a, b)| a - b)),
+            most(&mut voxels.iter().map(|i| after[*i] - before[*i])),
+        ]
     }
 }
 
-/// The error that rays have in the chart, 0.01 or less, and of thin sheets at this radius twice that.
+/// The error that rays have in the chart is 0.01 or less, in voxels of 1:8 it is twice that.
 pub const USUAL: f64 = 0.03;
-/// What the net has to err by somewhere, or the trial shows nothing.
-const FAILS: f64 = 0.1;
+/// As many times the error of rays the net has to err by somewhere, or the trial shows nothing.
+const FAILS: f64 = 3.0;
 
 const NAMES: [&str; 2] = ["rays, 50 (ours)", "network"];
 
@@ -348,9 +347,10 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
         found.push(offs);
     }
     let whole = Scene::of(&builtin(KINDS[0], plan.edge)?)?;
+    let before = stand.net(&whole);
     let mut beyond = [Vec::new(), Vec::new()];
     for &share in &plan.cuts {
-        let far = stand.beyond(&whole, share, plan.voxels);
+        let far = stand.beyond(&whole, &before, share, plan.voxels);
         (0..2).for_each(|n| beyond[n].push([share, far[n]]));
         tell();
     }
@@ -392,7 +392,7 @@ pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
             short(far[0]),
         ),
         ours: Ours::holding(worst(0) <= USUAL && far[0] == 0.0),
-        control_fails: worst(1) > FAILS.max(3.0 * worst(0)) && far[1] > 0.0,
+        control_fails: worst(1) > FAILS * worst(0) && far[1] > 0.0,
         setting: format!(
             "engine {}³ by the preset auto, radius {} mm, voxels of 1 mm; {} voxels that count against the ambient integral of {} directions; balls of opacity \
              {OPACITY}; the net that is shipped, by its twin",
