@@ -266,7 +266,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
         ("--quadrature simpson", &["--quadrature", "segment"]),
         (
             "--method ssao",
-            &["--method", "sat, shells, vicinity, histograms, fdao, spao, cones, lao, cao, rays"],
+            &["--method", "sat, shells, vicinity, histograms, dvao, fdao, spao, cones, lao, cao, rays"],
         ),
         ("--radius-mm -1", &["--radius-mm", "-1", ">= 0 mm"]),
         ("--radius-mm nan", &["--radius-mm", ">= 0 mm"]),

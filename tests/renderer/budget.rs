@@ -53,7 +53,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
     let mut scene = scene_up_to(21, &mut random, name, method);
     // One renderer under budgets, and one that does everything at once.
     let make =
-        || Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
+        || renderer_of(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
     let (mut renderer, mut at_once) = (make().unwrap(), make().unwrap());
     let mut told = VecDeque::new();
     let mut history = Vec::new();
@@ -192,7 +192,7 @@ fn moving(gpu: &Gpu, method: Method) -> Renderer {
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let mut setup = Setup::of(method, 1.0);
     setup.occlusion.radius_mm = 4.0;
-    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, cao::renderer::COLOUR).unwrap();
+    let mut renderer = renderer_of(gpu, &volume, transfer, setup, cao::renderer::COLOUR).unwrap();
     renderer.update(&mut |_| ()).unwrap();
     renderer
 }
