@@ -68,10 +68,11 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
             let kind = if random.below(40) == 0 { 6 } else { kind };
             let (mut again, mut same) = (scene.clone(), random.clone());
             again.edit_of(kind, &mut same, &mut at_once);
+            let coloured = scene.setup.coloured();
             let edit = scene.edit_of(kind, &mut random, &mut renderer);
             edited = true;
-            // Another method had its own volume.
-            if edit.ends_with("and back") {
+            // Another method had its own volume, and so has light in colours.
+            if edit.ends_with("and back") || scene.setup.coloured() != coloured {
                 volumes = vec![vec![1.0_f32.to_bits(); scene.volume.len()]];
                 told.clear();
             }

@@ -14,6 +14,9 @@ const SHAPE: Shape = Shape { edge: 16, filters: 4, cap: 8, levels: 2, label: Lab
 /// Two layers of f16 (tests/kernels/conv3.rs), and V_o and V_AO in 65535ths.
 const ROUNDED: f32 = 3e-3;
 
+/// Places of samples of V_o are rounded in shares of the volume's edge; a number of f16 here or there falls to the other side.
+const PLACED: f32 = 1e-3;
+
 fn setup(radius_mm: f32, tiles: bool) -> Setup {
     let mut setup = Setup { scope: Scope::All, ..Setup::of(Method::Deep, 1.0) };
     setup.occlusion.radius_mm = radius_mm;
@@ -84,7 +87,8 @@ fn tiles_give_every_voxel_its_value_in_its_place() {
             // Of the second tile; the third, which sees the same, has those 10 farther on.
             if (13..23).contains(&voxel[axis]) {
                 voxel[axis] += 10;
-                assert_eq!(found[grid.index(voxel)], *value, "{voxel:?}");
+                let apart = (found[grid.index(voxel)] - value).abs();
+                assert!(apart <= PLACED, "{voxel:?}: {apart}");
                 compared += 1;
                 varied = varied.max((value - 0.5).abs());
             }
