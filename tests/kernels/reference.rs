@@ -95,7 +95,11 @@ fn kernel_and_twin_agree_at_any_point_whoever_interpolates() {
                 let context = format!("{:?} {integral:?} {filtered}", grid.dims);
                 assert!(worst(&expected) < ROUNDING, "{context}: {:e}", worst(&expected));
                 // The tolerance tells rays apart that are a hundredth longer.
-                assert!(integral.samples == 0 || worst(&other) > 10.0 * ROUNDING, "{context}: {:e}", worst(&other));
+                assert!(
+                    integral.samples == 0 || worst(&other) > 10.0 * ROUNDING,
+                    "{context}: {:e}",
+                    worst(&other)
+                );
             }
         }
     }
