@@ -16,7 +16,7 @@ struct ReferenceParams {
     step: f32,
     // step / reference length of the opacity
     exponent: f32,
-    // AMBIENT, LITERAL
+    // AMBIENT, LITERAL, END
     rule: u32,
     // points to work on
     base: u32,
@@ -45,8 +45,11 @@ struct Found {
 // Rules along a ray.
 const AMBIENT = 0u;
 const LITERAL = 1u;
+const END = 2u;
 // What is left of a ray below this adds no more than this.
 const DARK = 1e-7;
+// A ray of END stops with less than this left.
+const STOP = 0.01;
 
 var<immediate> params: ReferenceParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;
@@ -84,7 +87,7 @@ fn mean_transmittance(x: f32) -> f32 {
     return (1.0 - exp(-x)) / x;
 }
 
-// Mean over the samples of one ray; `along` is its direction in voxels a mm.
+// Mean over the samples of one ray, or what is left at its end; `along` is its direction in voxels a mm.
 fn ray(start: vec3<f32>, along: vec3<f32>) -> f32 {
     // Samples in the box of the texels; those behind it see no opacity.
     let side = select(vec3(0.0), vec3<f32>(params.dims - 1u), along > vec3(0.0));
@@ -120,10 +123,16 @@ fn ray(start: vec3<f32>, along: vec3<f32>) -> f32 {
         let depth = -params.exponent * log(q);
         sum += before * select(1.0, mean_transmittance(depth), params.rule == AMBIENT);
         before *= exp(-depth);
+        if params.rule == END && before < STOP {
+            break;
+        }
         if before < DARK {
             before = 0.0;
             break;
         }
+    }
+    if params.rule == END {
+        return before;
     }
     return (sum + before * f32(params.samples - m)) / f32(params.samples);
 }

@@ -7,6 +7,7 @@ pub mod chart;
 pub mod contender;
 pub mod error;
 pub mod exactness;
+pub mod examples;
 pub mod failure;
 pub mod flip;
 pub mod kernels;

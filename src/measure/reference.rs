@@ -161,6 +161,33 @@ pub fn ambient_at(
     Ok(scene.evaluate(points, &integral, reference_mm, progress)?.0)
 }
 
+/// Any integral at voxels of volumes, one after the other, of opacity per `reference_mm`: for who needs thousands, and their error not.
+pub struct Evaluator<'a> {
+    gpu: &'a Gpu,
+    kernel: Kernel,
+}
+
+impl<'a> Evaluator<'a> {
+    /// Builds the pipeline.
+    pub fn new(gpu: &'a Gpu) -> Result<Self> {
+        Ok(Self { gpu, kernel: Kernel::new(gpu)? })
+    }
+
+    /// Values of these voxels (indices into `opacity`), in their order. Uses the device's queue and waits for it.
+    pub fn evaluate(
+        &self,
+        grid: &Grid,
+        opacity: &[f32],
+        voxels: impl Iterator<Item = usize>,
+        integral: &Integral,
+        reference_mm: f64,
+    ) -> Result<Vec<f32>> {
+        let at: Vec<[f64; 3]> = voxels.map(|i| grid.voxel(i).map(|c| c as f64)).collect();
+        let scene = Scene::new(self.gpu, &self.kernel, grid, opacity)?;
+        Ok(scene.evaluate(&at, integral, reference_mm, &mut |_| ())?.0)
+    }
+}
+
 /// The ambient integral of these lengths.
 fn integral(radius_mm: f64, offset_mm: f64, grid: &Grid, plan: &Plan) -> Result<Integral> {
     check("radius_mm", radius_mm, 0.0)?;

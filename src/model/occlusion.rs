@@ -345,6 +345,9 @@ pub enum Rule {
     Ambient = 0,
     /// CAO eq. (2): the mean over the samples of the transmittance in front of each.
     Literal = 1,
+    /// DVAO eq. (1) as its authors programmed it: the transmittance behind the last sample, or where a ray stops with less than
+    /// [`Integral::STOP`] left.
+    End = 2,
 }
 
 impl Integral {
@@ -373,12 +376,23 @@ impl Integral {
         Self { rule: Rule::Literal, directions, first_mm, step_mm, samples, light }
     }
 
+    /// What is left of a ray of [`Rule::End`] when it stops.
+    pub const STOP: f32 = 0.01;
+
+    /// The transmittance at the ends of rays of `radius_mm` (DVAO eq. (1) as programmed): samples every half of the smallest spacing, the
+    /// first at one and a half of it. Of opacity per half a spacing.
+    pub fn end(radius_mm: f64, directions: u32, min_spacing: f64) -> Self {
+        let samples = (2.0 * radius_mm / min_spacing - 1e-6).ceil().max(0.0) as u32;
+        let (first_mm, step_mm, light) = (1.5 * min_spacing, 0.5 * min_spacing, AmbientLight::Uniform);
+        Self { rule: Rule::End, directions, first_mm, step_mm, samples, light }
+    }
+
     /// The same at twice the resolution: twice the directions, and for [`Rule::Ambient`] half the step.
     #[must_use]
     pub fn doubled(&self) -> Self {
         let directions = 2 * self.directions;
         match self.rule {
-            Rule::Literal => Self { directions, ..*self },
+            Rule::Literal | Rule::End => Self { directions, ..*self },
             Rule::Ambient => {
                 let step_mm = 0.5 * self.step_mm;
                 let first_mm = self.first_mm - 0.5 * step_mm;

@@ -371,6 +371,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/measure/planner.rs", &["failure", "random"]),
     ("src/measure/reference.rs", &["failure", "kernels", "random"]),
     ("src/measure/contender/", &["failure", "kernels"]),
+    ("src/measure/examples/", &["failure", "error", "random", "reference"]),
     ("src/measure/stability/", &["failure", "error", "exactness", "flip", "plot", "random", "reference"]),
     (
         "src/measure/chart/",

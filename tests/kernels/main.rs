@@ -12,6 +12,7 @@ mod clusters;
 mod cone;
 mod conv3;
 mod dilate;
+mod examples;
 mod expand;
 mod extent;
 mod fdao;

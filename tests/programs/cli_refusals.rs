@@ -524,6 +524,16 @@ fn without_a_device_the_user_is_told_how_to_get_one() {
 }
 
 #[test]
+fn examples_ask_for_sources_that_there_are() {
+    let folder = Folder::without_device();
+    refused(&folder, "examples --count 1 -o out", USAGE, &["--builtin NAME", "--volume FILE"]);
+    refused(&folder, "examples --count 1 --builtin colour -o out", USAGE, &["colour", "beetle", "solids"]);
+    refused(&folder, "examples --count 0 --builtin fruit -o out", USAGE, &["--count"]);
+    refused(&folder, "examples --count 1 --builtin fruit --label max -o out", USAGE, &["mean or end"]);
+    refused(&folder, "examples --count 1 --volume absent.nrrd -o out", FAILURE, &["absent.nrrd"]);
+}
+
+#[test]
 fn stability_asks_for_a_folder_and_for_trials_that_there_are() {
     let folder = Folder::without_device();
     folder.put("taken", "a file");

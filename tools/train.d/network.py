@@ -15,13 +15,12 @@ from dataclasses import asdict, dataclass
 
 import numpy
 import torch
+from active import Active
+from arguments import INJECTIONS, LABELS
 from torch import nn
 from torch.nn import functional as F
 
-INJECTIONS = ("preclassified", "global", "latent")
-LABELS = ("mean", "end")
 DESCRIPTOR = 64
-EPSILON = 1e-5
 
 
 @dataclass(frozen=True)
@@ -66,13 +65,6 @@ class Shape:
             out.append((f"decoder.{i}.1", c(level), c(level - 1), True))
         out.append(("last", 2 * c(0) + beside, 1, True))
         return out
-
-
-def normal(x):
-    """Instance normalisation without affine, in f32: (x - mean) / sqrt(variance + 1e-5), with the biased variance."""
-    x = x.float()
-    variance, mean = torch.var_mean(x, dim=(2, 3, 4), keepdim=True, correction=0)
-    return (x - mean) * torch.rsqrt(variance + EPSILON)
 
 
 def halved(x):
@@ -121,8 +113,7 @@ class Net(nn.Module):
         return F.conv3d(x, self.weight(name).to(self.precision), padding=1)
 
     def active(self, name, x):
-        x = F.mish(x)
-        return normal(x) if self.normalised[name] else x
+        return Active.apply(x) if self.normalised[name] else F.mish(x)
 
     def block(self, name, x):
         return self.conv(name, self.active(name, x))

@@ -11,6 +11,7 @@ use cao_model::fit::Fit;
 use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
+use cao_model::network::Label;
 use cao_model::occlusion::Quadrature;
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
@@ -64,6 +65,9 @@ pub enum Command {
     /// Show where methods fail, ours beside them: data, charts and one sentence for each trial
     #[command(after_help = STABILITY_EXAMPLES)]
     Stability(Stability),
+    /// Make volumes with exact ambient values to train a network on
+    #[command(after_help = EXAMPLES_EXAMPLES)]
+    Examples(Examples),
     /// Show a volume's header, value range and histogram
     Info(Info),
     /// List the Vulkan devices
@@ -122,6 +126,13 @@ Examples:
 
 Exit code 1 if ours fails where it claims to hold, or the method that a trial
 is there to catch does not.";
+
+const EXAMPLES_EXAMPLES: &str = "\
+Examples:
+  cao examples --builtin fruit --builtin solids --count 100 -o examples
+  cao examples --volume head.nrrd --count 20 --seed 7 -o examples
+
+A random transfer function and rotation for each. `tools/train` runs this.";
 
 /// Clips: every --clip begins a new one, and the --clip-* after it belong to it.
 #[derive(Args)]
@@ -386,6 +397,40 @@ pub struct Stability {
     /// Name the trials, and do nothing else
     #[arg(long)]
     pub list: bool,
+}
+
+#[derive(Args)]
+pub struct Examples {
+    /// Folder for the examples and examples.json; made where there is none
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// How many to make
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub count: u32,
+    /// Voxels along each axis
+    #[arg(long, value_name = "VOXELS", default_value_t = 64, value_parser = clap::value_parser!(u32).range(8..=512))]
+    pub edge: u32,
+    /// Samples along each axis of a voxel, of which it is the mean
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub samples: u32,
+    /// Seed of everything that is random
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub seed: u64,
+    /// Mean transmittance of the rays, or that at their ends; twice for both [default: both]
+    #[arg(long, value_name = "mean|end", value_parser = label)]
+    pub label: Vec<Label>,
+    /// A built-in volume of random proportions, or `solids`, random solids; more often for more of them
+    #[arg(long, value_name = "NAME")]
+    pub builtin: Vec<String>,
+    /// A volume; more often for more of them
+    #[arg(long, value_name = "FILE")]
+    pub volume: Vec<OsString>,
+    #[command(flatten)]
+    pub raw: Raw,
+}
+
+fn label(text: &str) -> Result<Label, String> {
+    Label::ALL.into_iter().find(|label| label.name() == text).ok_or_else(|| "expected mean or end".into())
 }
 
 #[derive(Args)]

@@ -6,6 +6,7 @@ mod args;
 mod budget;
 mod chart;
 mod devices;
+mod examples;
 mod info;
 mod occlusion;
 mod render;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
         args::Command::Verify(a) => verify::run(&cli.global, a),
         args::Command::Chart(a) => chart::run(&cli.global, a),
         args::Command::Stability(a) => stability::run(&cli.global, a),
+        args::Command::Examples(a) => examples::run(&cli.global, a),
         args::Command::Info(a) => info::run(&cli.global, a),
         args::Command::Devices => devices::run(&cli.global),
     };

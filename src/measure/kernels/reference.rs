@@ -172,6 +172,7 @@ impl Reference {
             rule: match integral.rule {
                 Rule::Ambient => kernel::AMBIENT,
                 Rule::Literal => kernel::LITERAL,
+                Rule::End => kernel::END,
             },
             base,
             count,
