@@ -213,7 +213,10 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid sat shells vicinity histograms dvao fdao spao cones lao cao cao-literal rays, rays 6"),
+        (
+            "method",
+            "solid sat shells vicinity histograms dvao fdao spao cones lao cao cao-literal rays, rays 6",
+        ),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),

@@ -52,8 +52,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
     let mut random = Random::new(seed);
     let mut scene = scene_up_to(21, &mut random, name, method);
     // One renderer under budgets, and one that does everything at once.
-    let make =
-        || renderer_of(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
+    let make = || renderer_of(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
     let (mut renderer, mut at_once) = (make().unwrap(), make().unwrap());
     let mut told = VecDeque::new();
     let mut history = Vec::new();

@@ -48,8 +48,7 @@ pub struct Scene {
 
 impl Scene {
     pub fn renderer(&self, gpu: &Gpu) -> Renderer {
-        let mut renderer =
-            renderer_of(gpu, &self.volume, self.transfer.clone(), self.setup, COLOUR).unwrap();
+        let mut renderer = renderer_of(gpu, &self.volume, self.transfer.clone(), self.setup, COLOUR).unwrap();
         renderer.set_clips(&self.clips).unwrap();
         renderer.set_features(self.features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();

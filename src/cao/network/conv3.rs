@@ -116,7 +116,8 @@ impl Conv3 {
         items: Range<u32>,
     ) -> Result<()> {
         let Given { values, dims, at, low, high } = to;
-        let params = kernel::Conv3Params { given: dims, at, low, high, ..params(over.dims, &inputs, 1, items.start) };
+        let params =
+            kernel::Conv3Params { given: dims, at, low, high, ..params(over.dims, &inputs, 1, items.start) };
         let binds = kernel::LastBindings {
             source: inputs[0].tensor,
             beside: inputs[1].tensor,

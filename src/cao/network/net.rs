@@ -158,7 +158,16 @@ impl Scratch {
             Part::long(stages::GRID, move |rec| {
                 rec.barrier(&ALL, &ALL);
                 let (resize, before) = (&kernels.resize, window.before);
-                Ok(resize.record_shrink(rec, opacity, &self.grid, dims, before, voxel, exponent, items.clone())?)
+                Ok(resize.record_shrink(
+                    rec,
+                    opacity,
+                    &self.grid,
+                    dims,
+                    before,
+                    voxel,
+                    exponent,
+                    items.clone(),
+                )?)
             })
         })
     }
@@ -172,7 +181,8 @@ impl Scratch {
         window: &'a Window,
     ) -> impl Iterator<Item = Part<'a>> {
         self.slices(self.items(step)).map(move |items| {
-            let record = move |rec: &mut Recorder| self.record(rec, kernels, weights, (step, window), items.clone());
+            let record =
+                move |rec: &mut Recorder| self.record(rec, kernels, weights, (step, window), items.clone());
             Part::long(stages::NETWORK, move |rec| Ok(record(rec)?))
         })
     }

@@ -40,11 +40,15 @@ impl Placement {
         // Without rays nothing is occluded, and no grid is that fine.
         let step = if radius_mm == 0.0 { f32::INFINITY } else { radius_mm / shape.radius() };
         // Rounding of lengths in mm must not make a voxel more.
-        let covers = |i: usize| ((field.dims[i] as f32 * field.spacing[i] / step) - 1e-3).ceil().max(1.0) as u64;
+        let covers =
+            |i: usize| ((field.dims[i] as f32 * field.spacing[i] / step) - 1e-3).ceil().max(1.0) as u64;
         let count: [u64; 3] = std::array::from_fn(covers);
         let voxel = field.spacing.map(|spacing| spacing / step);
         let product = |dims: [u64; 3]| dims.iter().fold(1u64, |product, edge| product.saturating_mul(*edge));
-        if cover == Cover::Tiles && count.iter().any(|n| *n > u64::from(shape.edge)) && product(count) <= u64::from(u32::MAX) {
+        if cover == Cover::Tiles
+            && count.iter().any(|n| *n > u64::from(shape.edge))
+            && product(count) <= u64::from(u32::MAX)
+        {
             return Ok(Self::tiles(shape, count.map(|n| n as u32), voxel));
         }
         let edges = count.map(|n| n.next_multiple_of(1 << shape.levels));
@@ -154,7 +158,8 @@ impl Gather for Predicted {
         }
         // A voxel of the grid in mm, and what the network takes opacities to be per.
         let voxel = self.placement.grid.voxel;
-        let exponent = self.network.shape().label.reference() * (on.field.spacing[0] / voxel[0]) / on.ambient_mm;
+        let exponent =
+            self.network.shape().label.reference() * (on.field.spacing[0] / voxel[0]) / on.ambient_mm;
         let net = &self.scratch;
         let of = |window| {
             let steps = net.plan.steps.iter();

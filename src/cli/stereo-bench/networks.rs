@@ -54,7 +54,14 @@ pub fn bars(cli: &Cli, software: bool, rows: &mut Rows) -> Result<()> {
         let bar = |most: f64| if software { Bar::None } else { Bar::AtMost(most) };
         let place = format!("dvao, grid of {edge}³, {what}");
         let note = format!("{weights} weights; an update after any edit");
-        rows.push(Row { place: place.clone(), what: "update".into(), bar: bar(most_ms), unit: "ms", found, note })?;
+        rows.push(Row {
+            place: place.clone(),
+            what: "update".into(),
+            bar: bar(most_ms),
+            unit: "ms",
+            found,
+            note,
+        })?;
         let note = "peak, with a volume of the grid's size and its picture's".into();
         let found = vec![mib];
         rows.push(Row { place, what: "device memory".into(), bar: bar(1536.0), unit: "MiB", found, note })?;
