@@ -17,11 +17,7 @@ struct CarveParams {
     sampling: Sampling,
 }
 
-// Squared distance in mm from each brick to the nearest changed one.
-struct Change {
-    distance: array<f32>,
-}
-
+#include "shared/change.wgsl"
 #include "shared/features.wgsl"
 #include "shared/growing.wgsl"
 #include "shared/parts.wgsl"

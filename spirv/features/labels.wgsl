@@ -5,11 +5,7 @@ struct LabelsParams {
     dims: vec3<u32>,
 }
 
-// Squared distance in mm from each brick to the nearest changed one.
-struct Change {
-    distance: array<f32>,
-}
-
+#include "shared/change.wgsl"
 #include "shared/bricks.wgsl"
 
 var<immediate> params: LabelsParams;

@@ -11,11 +11,7 @@ struct MaskParams {
     all: u32,
 }
 
-// Squared distance in mm from each brick to the nearest changed one.
-struct Change {
-    distance: array<f32>,
-}
-
+#include "shared/change.wgsl"
 #include "shared/growing.wgsl"
 #include "shared/held.wgsl"
 

@@ -33,7 +33,7 @@ struct Tints {
     all: array<vec4<f32>>,
 }
 
-#include "shared/solid.wgsl"
+#include "shared/listed.wgsl"
 #include "shared/nearest.wgsl"
 #include "shared/transfer.wgsl"
 
@@ -110,48 +110,49 @@ fn shade_coloured(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_i
     }
 }
 
-// The cluster of voxel i of a brick; NONE of one that needs no value.
-fn cluster_of(corner: vec3<u32>, i: u32) -> u32 {
-    if params.unneeded == 1u || needed(inside(i)) {
-        return textureLoad(index, (corner + inside(i)) / params.block, 0).r;
+// The voxel i of the listed brick of a group, and its cluster; NONE of one that needs no value, and `there` of one that there is.
+struct Found {
+    voxel: vec3<u32>,
+    there: bool,
+    cluster: u32,
+}
+
+fn found(brick: vec4<u32>, i: u32) -> Found {
+    let voxel = brick.xyz + inside(i);
+    let there = brick.w == 1u && all(voxel < params.dims);
+    var cluster = NONE;
+    if there && (params.unneeded == 1u || needed(inside(i))) {
+        cluster = textureLoad(index, voxel / params.block, 0).r;
     }
-    return NONE;
+    return Found(voxel, there, cluster);
 }
 
 @compute @workgroup_size(TEAM)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, lane);
+    let brick = listed_brick(group, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
-        let voxel = corner + inside(i);
-        if listed && all(voxel < params.dims) {
-            let cluster = cluster_of(corner, i);
-            var value = 1.0;
-            if cluster != NONE {
-                value = factors.all[cluster];
-            }
-            textureStore(ambient, voxel, vec4(value, 0.0, 0.0, 0.0));
+        let at = found(brick, i);
+        var value = 1.0;
+        if at.cluster != NONE {
+            value = factors.all[at.cluster];
+        }
+        if at.there {
+            textureStore(ambient, at.voxel, vec4(value, 0.0, 0.0, 0.0));
         }
     }
 }
 
 @compute @workgroup_size(TEAM)
 fn main_coloured(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, lane);
+    let brick = listed_brick(group, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
-        let voxel = corner + inside(i);
-        if listed && all(voxel < params.dims) {
-            let cluster = cluster_of(corner, i);
-            var value = vec4(1.0);
-            if cluster != NONE {
-                value = tints.all[cluster];
-            }
-            textureStore(coloured, voxel, value);
+        let at = found(brick, i);
+        var value = vec4(1.0);
+        if at.cluster != NONE {
+            value = tints.all[at.cluster];
+        }
+        if at.there {
+            textureStore(coloured, at.voxel, value);
         }
     }
 }

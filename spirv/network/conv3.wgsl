@@ -23,6 +23,12 @@ struct Conv3Params {
     out_blocks: u32,
     // first item to work on
     base: u32,
+    // of `last`: voxels that are given, from `low` up to `high`
+    low: vec3<u32>,
+    high: vec3<u32>,
+    // of `last`: the grid that they are given to, and where in it the first voxel would be
+    given: vec3<u32>,
+    at: vec3<i32>,
 }
 
 struct Weights {
@@ -215,8 +221,9 @@ fn with_eight(sums: vec4<f32>, w: u32, a: Eight, b: Eight, c: Eight, d: Eight) -
 }
 
 fn give(place: vec3<u32>, sum: f32) {
-    if all(place < params.dims) {
-        values.all[voxel_at(place, params.dims)] = 1.0 / (1.0 + exp(-sum));
+    if all(place >= params.low) && all(place < params.high) {
+        let there = vec3<u32>(vec3<i32>(place) + params.at);
+        values.all[voxel_at(there, params.given)] = 1.0 / (1.0 + exp(-sum));
     }
 }
 

@@ -17,7 +17,7 @@ struct OutputParams {
     voxel: vec3<f32>,
 }
 
-#include "shared/solid.wgsl"
+#include "shared/listed.wgsl"
 
 struct Grid {
     all: array<f32>,
@@ -52,13 +52,10 @@ fn value_of(voxel: vec3<u32>) -> f32 {
 
 @compute @workgroup_size(TEAM)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, lane);
+    let brick = listed_brick(group, lane);
     for (var i = lane; i < VOXELS; i += TEAM) {
-        let voxel = corner + inside(i);
-        if listed && all(voxel < params.dims) {
+        let voxel = brick.xyz + inside(i);
+        if brick.w == 1u && all(voxel < params.dims) {
             var value = 1.0;
             if params.unneeded == 1u || needed(inside(i)) {
                 value = value_of(voxel);

@@ -14,8 +14,8 @@ struct ResizeParams {
     samples: vec3<u32>,
     // first voxel to work on
     base: u32,
-    // of `shrink`: voxels of the grid before the volume begins
-    before: vec3<u32>,
+    // of `shrink`: where in the grid the volume begins
+    before: vec3<i32>,
 }
 
 #include "shared/tensors.wgsl"
@@ -41,7 +41,7 @@ fn shrink(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     if i >= params.count {
         return;
     }
-    let lowest = (vec3<f32>(place_at(i, params.dims)) - vec3<f32>(params.before)) * params.voxel;
+    let lowest = vec3<f32>(vec3<i32>(place_at(i, params.dims)) - params.before) * params.voxel;
     let step = params.voxel / vec3<f32>(params.samples);
     var sum = 0.0;
     for (var z = 0u; z < params.samples.z; z++) {

@@ -32,7 +32,7 @@ struct Shells {
     all: array<Shell>,
 }
 
-#include "shared/solid.wgsl"
+#include "shared/listed.wgsl"
 #include "shared/segment.wgsl"
 
 var<immediate> params: BoxesParams;
@@ -112,10 +112,9 @@ fn value_of(voxel: vec3<u32>, rule: u32) -> f32 {
 
 // One brick.
 fn work(group: vec3<u32>, lane: u32, rule: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, lane);
+    let brick = listed_brick(group, lane);
+    let corner = brick.xyz;
+    let listed = brick.w == 1u;
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {

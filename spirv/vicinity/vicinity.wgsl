@@ -29,7 +29,7 @@ struct Directions {
     all: array<Direction>,
 }
 
-#include "shared/solid.wgsl"
+#include "shared/listed.wgsl"
 #include "shared/opaque.wgsl"
 #include "shared/parts.wgsl"
 
@@ -112,10 +112,9 @@ fn value_of(voxel: vec3<i32>) -> f32 {
 
 @compute @workgroup_size(TEAM)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let entry = params.base + item_of_group(group);
-    let listed = entry < list.count;
-    let corner = brick_at(list.items[select(0u, entry, listed)], params.bricks) * BRICK;
-    find_solid(corner, lane);
+    let brick = listed_brick(group, lane);
+    let corner = brick.xyz;
+    let listed = brick.w == 1u;
     for (var i = lane; i < VOXELS; i += TEAM) {
         let voxel = corner + inside(i);
         if listed && all(voxel < params.dims) {

@@ -29,7 +29,8 @@ use cao_gpu::{Access, Buffer, Format, Gpu, Image};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
 use cao_model::light::AmbientLight;
-use cao_model::occlusion::Occlusion;
+use cao_model::network::Network;
+use cao_model::occlusion::{Occlusion, Quadrature};
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -185,6 +186,29 @@ impl Renderer {
     pub fn set_ambient_light(&mut self, light: AmbientLight) -> Result<()> {
         let setup = *self.setup();
         self.set_setup(Setup { occlusion: Occlusion { light, ..setup.occlusion }, ..setup })
+    }
+
+    /// Changes the network of method `dvao`; of others nothing is seen of it until they are that one. Uses the device's queue with that method: then
+    /// nothing is occluded until the next update has ended. On error everything stays as it was.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a radius that the network has no grid for, and those of a device without memory.
+    pub fn set_network(&mut self, network: Network) -> Result<()> {
+        let before = std::mem::replace(&mut self.subject.network, network);
+        if self.setup().occlusion.quadrature != Quadrature::Network {
+            return Ok(());
+        }
+        match method::of(&self.subject) {
+            Ok(ambient) => self.ambient = ambient,
+            Err(error) => {
+                self.subject.network = before;
+                return Err(error);
+            }
+        }
+        self.spoil();
+        self.pace.clear();
+        self.building.rates.clear();
+        Ok(())
     }
 
     /// Makes what is held fit the setup; of another method, or of light in colours or none, nothing is up to date.

@@ -67,7 +67,7 @@ impl Subject {
             ambient_mm: transfer.reference_mm(f64::from(field.min_spacing())),
             setup,
             wanted: setup,
-            network: crate::network::small(),
+            network: Network::small(),
             transfer,
             clips: Vec::new(),
             classes: Classes::new(gpu)?,

@@ -91,9 +91,11 @@ pub enum CaoMethod {
     Spao = 8,
     /// Cone tracing.
     Cones = 9,
+    /// Deep volumetric ambient occlusion, by the network that is shipped: every update runs it whole.
+    Deep = 10,
 }
 
-pub(crate) const METHODS: [Method; 10] = [
+pub(crate) const METHODS: [Method; 11] = [
     Method::Rays,
     Method::Cao,
     Method::Lao,
@@ -104,6 +106,7 @@ pub(crate) const METHODS: [Method; 10] = [
     Method::FeatureDriven,
     Method::Spao,
     Method::Cones,
+    Method::Deep,
 ];
 
 /// How occlusion is computed. All but the size 0 is the default.

@@ -204,9 +204,10 @@ fn numbers_of_shapes_are_those_of_the_header() {
 
 #[test]
 fn numbers_of_methods_are_those_of_the_header() {
-    use CaoMethod::{Cao, Cones, FeatureDriven, Histograms, Lao, Rays, Sat, Shells, Spao, Vicinity};
-    let numbers = [Rays, Cao, Lao, Sat, Shells, Vicinity, Histograms, FeatureDriven, Spao, Cones];
-    let names = ["rays", "cao", "lao", "sat", "shells", "vicinity", "histograms", "fdao", "spao", "cones"];
+    use CaoMethod::{Cao, Cones, Deep, FeatureDriven, Histograms, Lao, Rays, Sat, Shells, Spao, Vicinity};
+    let numbers = [Rays, Cao, Lao, Sat, Shells, Vicinity, Histograms, FeatureDriven, Spao, Cones, Deep];
+    let names =
+        ["rays", "cao", "lao", "sat", "shells", "vicinity", "histograms", "fdao", "spao", "cones", "dvao"];
     for (number, name) in numbers.into_iter().zip(names) {
         assert_eq!(METHODS[number as usize].name(), name);
     }

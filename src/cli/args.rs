@@ -1,6 +1,7 @@
 //! Flags that the programs share, and what they mean.
 
 use anyhow::{Context, Result};
+use cao::renderer::Renderer;
 use cao_formats::feature::{FeatureSettings, LabelMap};
 use cao_formats::scene::VolumeSource;
 use cao_formats::{NoNumbers, Reading};
@@ -11,6 +12,7 @@ use cao_model::feature::Features;
 use cao_model::frame::Frame;
 use cao_model::light::{AmbientLight, LIGHTS, Lights};
 use cao_model::methods::{Entry, Method};
+use cao_model::network::Network;
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::options::{KEYS, Key, Options};
 use cao_model::settings::{Scope, Setup};
@@ -168,6 +170,17 @@ pub struct Settings {
     /// What single methods take beside.
     #[arg(long = "option", value_name = "NAME=VALUE", value_parser = option, help = options_help())]
     pub options: Vec<(String, String)>,
+    /// Weight file of another network for method dvao, as tools/train writes it [default: the one that is built in]
+    #[arg(long, value_name = "FILE", value_parser = network)]
+    pub network: Option<Network>,
+}
+
+/// A weight file.
+///
+/// # Errors
+/// What is wrong with it, for who reads the command line.
+pub fn network(path: &str) -> Result<Network, String> {
+    Ok(cao_formats::network::load(Path::new(path)).map_err(|error| error.to_string())?.network)
 }
 
 fn option(text: &str) -> Result<(String, String), String> {
@@ -188,6 +201,14 @@ fn options_help() -> String {
 }
 
 impl Settings {
+    /// Gives a renderer the network that is asked for.
+    ///
+    /// # Errors
+    /// As [`Renderer::set_network`].
+    pub fn give_network(&self, renderer: &mut Renderer) -> cao::Result<()> {
+        self.network.clone().map_or(Ok(()), |network| renderer.set_network(network))
+    }
+
     /// These options with what is asked for.
     pub fn options(&self, mut options: Options) -> cao_model::Result<Options> {
         self.options.iter().try_for_each(|(name, value)| options.set(name, value))?;

@@ -17,7 +17,7 @@
 //! repeats each: the paper says trilinear, the authors' program nearest. *Skips* are what `first` and each encoder's second convolution give.
 
 use crate::{Error, Result};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The shape of a network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,6 +161,9 @@ impl Shape {
     }
 }
 
+/// The weight file of [`Network::small`]; `cao_formats::network` reads such files.
+static SMALL: &[u8] = include_bytes!("small.net");
+
 /// A network with its weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
@@ -185,6 +188,19 @@ impl Network {
             return Err(Error::refused(&layer.name, "has weights that are no finite numbers"));
         }
         Ok(network)
+    }
+
+    /// The one that is used unless another is given, of [`Shape::SMALL`] (docs/training.md).
+    pub fn small() -> Self {
+        static READ: OnceLock<Network> = OnceLock::new();
+        let read = || {
+            // The file is ours: a test holds that this is what the reader makes of it.
+            let head = 16 + u32::from_le_bytes([SMALL[12], SMALL[13], SMALL[14], SMALL[15]]) as usize;
+            let weights = SMALL[head..head + 2 * Shape::SMALL.weights()].chunks_exact(2);
+            let weights = weights.map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+            Self::new(Shape::SMALL, weights).expect("the network that is shipped is one")
+        };
+        READ.get_or_init(read).clone()
     }
 
     /// Its shape.

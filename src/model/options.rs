@@ -18,6 +18,8 @@ pub struct Options {
     pub bleeding: f32,
     /// Which of the features around it shades a place, of `fdao`.
     pub combine: Combine,
+    /// How much of a volume's grid the network of `dvao` sees at once.
+    pub grid: Cover,
 }
 
 /// Volumes of means over cubes of 2^l voxels (SPAO §1.2.3).
@@ -31,6 +33,15 @@ pub enum Levels {
     Mixed(u32),
     /// So many N-buffers at full resolution, then halvings: ours.
     Reversed(u32),
+}
+
+/// How a network covers a grid that is larger than the cubes that it was trained on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cover {
+    /// At once.
+    Whole,
+    /// By such cubes, which overlap by the length of the rays.
+    Tiles,
 }
 
 /// How the occlusion of each feature becomes a place's (fdAO §4.2).
@@ -58,7 +69,7 @@ pub struct Key {
 }
 
 /// Every option.
-pub static KEYS: [Key; 6] = [
+pub static KEYS: [Key; 7] = [
     Key {
         name: "levels",
         takes: "nbuffer, mip, mixed:N or reversed:N, N 1 to 9",
@@ -139,6 +150,25 @@ pub static KEYS: [Key; 6] = [
             Some(())
         },
     },
+    Key {
+        name: "grid",
+        takes: "whole or tiles",
+        get: |o| {
+            let name = match o.grid {
+                Cover::Whole => "whole",
+                Cover::Tiles => "tiles",
+            };
+            name.into()
+        },
+        set: |o, text| {
+            o.grid = match text {
+                "whole" => Cover::Whole,
+                "tiles" => Cover::Tiles,
+                _ => return None,
+            };
+            Some(())
+        },
+    },
 ];
 
 fn whole(text: &str, least: u32, most: u32) -> Option<u32> {
@@ -160,6 +190,7 @@ impl Options {
         clusters: 1024,
         bleeding: 0.0,
         combine: Combine::Sample,
+        grid: Cover::Whole,
     };
     /// Most shells.
     pub const MOST_SHELLS: u32 = 64;
@@ -216,6 +247,7 @@ mod tests {
             ("clusters", "256"),
             ("bleeding", "0.25"),
             ("combine", "max"),
+            ("grid", "tiles"),
         ];
         let options = Options::default().with(&given).unwrap();
         let found = options.other_than(&Options::DEFAULT);
@@ -239,6 +271,7 @@ mod tests {
             ("clusters", "0", "1 to 4096"),
             ("bleeding", "1.5", "0 to 1"),
             ("combine", "mean", "neighbours"),
+            ("grid", "1", "tiles"),
         ] {
             let error = Options::default().with(&[(name, value)]).unwrap_err().to_string();
             assert!(error.contains(told), "{error}");

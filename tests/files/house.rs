@@ -335,6 +335,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/cones/", &["error", "stages", "drive", "field", "subject", "ambient", "by_brick", "pyramid"]),
     ("src/cao/tables/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),
     ("src/cao/histograms/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),
+    ("src/cao/network/", &["error", "host", "stages", "drive", "field", "subject", "ambient", "by_brick"]),
     ("src/cao/vicinity/", &["error", "stages", "drive", "field", "subject", "by_brick"]),
     (
         "src/cao/method.rs",
@@ -347,6 +348,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "cones",
             "features",
             "histograms",
+            "network",
             "rays",
             "spao",
             "tables",
@@ -369,6 +371,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/measure/planner.rs", &["failure", "random"]),
     ("src/measure/reference.rs", &["failure", "kernels", "random"]),
     ("src/measure/contender/", &["failure", "kernels"]),
+    ("src/measure/examples/", &["failure", "error", "random", "reference"]),
     ("src/measure/stability/", &["failure", "error", "exactness", "flip", "plot", "random", "reference"]),
     (
         "src/measure/chart/",

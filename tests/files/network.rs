@@ -179,3 +179,14 @@ fn cut_and_changed_files_are_refused_and_the_tensor_is_named() {
         refused(&hashed(content), &format!("a.net: {expected}: has weights that are no finite numbers"));
     }
 }
+
+#[test]
+fn the_network_that_is_built_in_is_what_the_reader_makes_of_its_file() {
+    let read = load(&source("src/model/small.net")).unwrap();
+    assert_eq!(read.network, Network::small());
+    assert_eq!(*read.network.shape(), Shape::SMALL);
+    // Who made it, of what.
+    for what in ["data", "seed", "steps"] {
+        assert!(read.card.iter().any(|(name, _)| name == what), "{what}");
+    }
+}

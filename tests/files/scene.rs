@@ -300,7 +300,7 @@ fn impossible_values_are_refused_by_name() {
         ("[occlusion]\nquadrature = \"simpson\"", "occlusion.quadrature: \"simpson\" is no rule"),
         (
             "[occlusion]\nmethod = \"ssao\"",
-            "occlusion.method: \"ssao\": expected sat, shells, vicinity, histograms, fdao, spao, cones, lao, cao, rays",
+            "occlusion.method: \"ssao\": expected sat, shells, vicinity, histograms, dvao, fdao, spao, cones, lao, cao, rays",
         ),
         ("[occlusion]\nscope = \"some\"", "occlusion.scope: \"some\": expected needed or all"),
         ("[stereo]\nipd_mm = -1", "stereo.ipd_mm: -1: expected a length >= 0 mm"),

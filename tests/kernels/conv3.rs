@@ -1,7 +1,7 @@
 //! The kernel `conv3` layer by layer in small nets: against the twin with what the device gave it, and against PyTorch.
 
 use cao::drive::Take;
-use cao::network::net::{Kernels, Scratch, Weights};
+use cao::network::net::{Kernels, Scratch, Weights, Window};
 use cao::network::plan::{CHANNELS, Plan, Step};
 use cao_gpu::{Access, Gpu};
 use cao_model::network::{Layer, half};
@@ -26,8 +26,9 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     fn new(gpu: &'a Gpu, reference: &Reference) -> Self {
-        let plan = Plan::new(reference.network.shape(), reference.dims.map(|d| d as u32));
-        let net = Scratch::new(gpu, plan).unwrap();
+        let dims = reference.dims.map(|d| d as u32);
+        let plan = Plan::new(reference.network.shape(), dims);
+        let net = Scratch::new(gpu, plan, dims).unwrap();
         let grid = buffer(gpu, "test grid", bytemuck::cast_slice(&reference.input));
         run(gpu, |rec| {
             rec.copy_buffer(&grid, 0, &net.grid, 0, grid.bytes()).unwrap();
@@ -38,7 +39,8 @@ impl<'a> Run<'a> {
     }
 
     fn step(&self, step: &Step) {
-        for part in self.net.step(&self.kernels, &self.weights, step) {
+        let whole = Window { before: [0; 3], at: [0; 3], low: [0; 3], high: self.net.given };
+        for part in self.net.step(&self.kernels, &self.weights, step, &whole) {
             run(self.gpu, |rec| part.record(rec, &Take::All).unwrap());
         }
     }

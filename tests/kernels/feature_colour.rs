@@ -43,7 +43,7 @@ fn renderer_by(
     let base = setup(MAPS);
     let occlusion = Occlusion { quadrature: method.quadrature(), ..base.occlusion };
     let setup = Setup { method, occlusion, ..base };
-    let mut renderer = Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR).unwrap();
+    let mut renderer = renderer_of(gpu, volume, transfer.clone(), setup, COLOUR).unwrap();
     renderer.set_clips(clips).unwrap();
     renderer.set_features(features.clone()).unwrap();
     renderer.update(&mut |_| ()).unwrap();
@@ -228,7 +228,7 @@ fn a_feature_that_changes_nothing_changes_no_bit_and_a_toggle_touches_only_what_
         let base = setup(MAPS);
         let occlusion = Occlusion { quadrature, rays: method.rays(), ..base.occlusion };
         let setup = Setup { method, occlusion, ..base };
-        let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
+        let mut renderer = renderer_of(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let before = state(&renderer);
         let grid = grid_of(&volume);

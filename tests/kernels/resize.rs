@@ -1,6 +1,6 @@
 //! The kernel `resize` against its twin: volumes in grids that are finer, coarser and as fine; tensors halved.
 
-use cao::network::resize::{Grid as Placement, Resize, items};
+use cao::network::resize::{Resize, items};
 use cao_gpu::{Access, BufferUse, Format};
 use cao_measure::random::Random;
 use cao_testing::*;
@@ -20,15 +20,13 @@ fn volumes_in_grids_equal_the_twins() {
         write_image(&gpu, &image, bytemuck::cast_slice(&opacity));
         for (step, exponent) in [(0.37, 0.6), (1.0, 1.0), (2.6, 2.3)] {
             let placed = Placed::new(grid, step, 4);
-            let to = Placement {
-                dims: placed.dims.map(|d| d as u32),
-                before: placed.before.map(|d| d as u32),
-                voxel: placed.voxel.map(|v| v as f32),
-            };
+            let dims = placed.dims.map(|d| d as u32);
+            let (before, voxel) = (placed.before.map(|d| d as i32), placed.voxel.map(|v| v as f32));
             let voxels: usize = placed.dims.iter().product();
             let out = gpu.buffer("test grid", 4 * voxels as u64, BufferUse::Device).unwrap();
             run(&gpu, |rec| {
-                kernel.record_shrink(rec, &image, (&out, &to), exponent, 0..items(voxels as u32)).unwrap();
+                let items = 0..items(voxels as u32);
+                kernel.record_shrink(rec, &image, &out, dims, before, voxel, exponent, items).unwrap();
                 rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
             });
             let found: Vec<f32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &out));

@@ -5,17 +5,19 @@ use cao::renderer::{COLOUR, Renderer};
 use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{
-    Chart, Plan, Scene, csv, draw, features, foresee, looks_draw, measure, paper, report,
+    Chart, Plan, Scene, csv, deep, draw, features, foresee, looks_draw, measure, paper, report,
 };
 use cao_measure::contender::{BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
 use cao_model::methods::Method;
+use cao_model::network::{Label, Shape};
 use cao_model::occlusion::{Quadrature, RaySet};
 use cao_model::samples::Filter;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
+use cao_testing::networks::network;
 use cao_testing::{close, open};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -185,6 +187,59 @@ fn the_paper_of_features_has_its_tables_and_pictures() {
     {
         assert!(page.contains(printed), "{printed}");
     }
+}
+
+/// At a quarter of a first look's size, by a small net of random weights for either truth: it has a row where it is for the truth and nowhere else, and
+/// more rays are nearer to the truth.
+#[test]
+fn table_3_of_a_network_has_its_rows_beside_the_printed() {
+    let gpu = open();
+    let plan = deep::Plan { edge: 16, scenes: 1, directions: 512, runs: 1 };
+    for label in Label::ALL {
+        let shape = Shape { edge: 8, filters: 2, cap: 4, levels: 2, label };
+        let net = network(shape, 5);
+        let found = deep::measure(&gpu, &net, &plan, &mut |_, share| assert!(share < 1.0)).unwrap();
+        for truth in Label::ALL {
+            let means = found.means(truth);
+            assert_eq!(means.iter().any(|(of, ..)| *of == deep::Of::Network), truth == label);
+            let rows = |kind: fn(deep::Of) -> bool| -> Vec<_> {
+                means
+                    .iter()
+                    .filter(|(of, ..)| kind(*of))
+                    .map(|(_, errors, costs)| (*errors, *costs))
+                    .collect()
+            };
+            let lao = rows(|of| matches!(of, deep::Of::Rays(Method::Lao, _) | deep::Of::Ends(_)));
+            let rays = rows(|of| matches!(of, deep::Of::Rays(Method::Rays, _) | deep::Of::Ends(_)));
+            for rows in [lao, rays] {
+                assert_eq!(rows.len(), 3);
+                // From 32 rays on what steps miss may be all that is left.
+                assert!(rows[2].0[1] < rows[0].0[1] && rows[2].0[0] > 0.98, "{rows:?}");
+                assert!(rows.iter().all(|(_, [ms, bytes])| ms.is_some() == bytes.is_some()));
+                assert_eq!(rows[0].1[0].is_some(), truth == Label::Mean, "times of what no method has");
+            }
+            if let Some((_, [ssim, mse], [Some(ms), Some(bytes)])) = means.first() {
+                assert!(
+                    *ssim < 0.9 && *mse > 1e-2 && *ms > 0.0 && *bytes > 1e4,
+                    "a random net is no method: {means:?}"
+                );
+            }
+        }
+        // A net, six methods, three of ends.
+        assert_eq!(found.runs().lines().count(), 1 + 10);
+        let shown = match label {
+            Label::Mean => "truth, DVAO; lao, 16; lao, 32; lao, 190",
+            Label::End => "truth, DVAO; LAO to its rays' ends, 16;",
+        };
+        let (shows, picture) = &found.figure;
+        assert!(shows.contains(shown) && (picture.width, picture.height) == (5 * 48, 2 * 48), "{shows}");
+        let page = found.html("a machine", "cao chart --dvao").unwrap();
+        well_formed(&page).unwrap();
+        for printed in ["0.81", "7e-3", "1322", "0.96", "8e-5", "417", "rays, 190", "Fig. 8, engine"] {
+            assert!(page.contains(printed), "{printed}");
+        }
+    }
+    close(gpu);
 }
 
 /// Known by hand: one voxel in a row of bricks.
@@ -571,6 +626,9 @@ fn what_cannot_be_charted_is_refused_by_name_and_leaves_nothing() {
         ("chart --runs 0 -o out", 2, "--runs"),
         ("chart --radius-mm 0 -o out", 2, "--radius-mm"),
         ("chart --fdao --paper -o out", 2, "--paper"),
+        ("chart --dvao --fdao -o out", 2, "--fdao"),
+        ("chart --network noise.nrrd -o out", 2, "noise.nrrd"),
+        ("chart --dvao --network file -o out", 2, "file"),
         ("chart builtin:pear:16 -o out", 1, "pear"),
         ("chart builtin:engine:16 builtin:engine:16 -o out", 2, "given twice"),
         ("chart noise.nrrd -o out", 1, "noise.nrrd"),

@@ -572,6 +572,34 @@ fn stability_writes_data_charts_and_one_page_with_all_of_them() {
     assert_eq!(list.lines().count(), cao_measure::stability::TRIALS.len(), "{list}");
 }
 
+#[test]
+fn examples_are_cubes_of_16_bits_and_an_index_that_says_what_they_are() {
+    let folder = Folder::with_device();
+    let made =
+        "examples --builtin solids --volume builtin:engine:24 --edge 16 --count 3 --seed 5 --label mean";
+    let answer = folder.json(&format!("{made} -o new/found"));
+    assert_eq!((&answer["examples"], &answer["checked"]), (&3.into(), &1.into()), "{answer}");
+    // As the generator's own test has it.
+    assert!(answer["largest_rmse"]["mean"].as_f64().unwrap() < 0.05, "{answer}");
+    let bytes = std::fs::read(folder.path("new/found/examples.u16")).unwrap();
+    assert_eq!(bytes.len(), 3 * 3 * 16_usize.pow(3) * 2);
+    let index = std::fs::read(folder.path("new/found/examples.json")).unwrap();
+    let index: serde_json::Value = serde_json::from_slice(&index).unwrap();
+    assert_eq!(index["cubes"], serde_json::json!(["opacity", "mean", "values"]));
+    let sources: Vec<_> = index["examples"].as_array().unwrap().iter().map(|e| &e["source"]).collect();
+    assert_eq!(sources, ["solids", "builtin:engine:24", "solids"]);
+    // Where there is opacity it is darker than where there is none.
+    let cube = |k: usize| {
+        bytes[k * 8192..(k + 1) * 8192].chunks(2).map(|b| f64::from(u16::from_le_bytes([b[0], b[1]])))
+    };
+    let mean = |opaque: bool| {
+        let chosen = cube(0).zip(cube(1)).filter(|(a, _)| (*a > 6000.0) == opaque).map(|(_, label)| label);
+        let (sum, count) = chosen.fold((0.0, 0.0), |(sum, count), label| (sum + label, count + 1.0));
+        sum / count
+    };
+    assert!(mean(true) < mean(false), "{} {}", mean(true), mean(false));
+}
+
 /// `verify` without a method proves the default and the paper's claim; `all` is the list.
 #[test]
 fn verify_reports_every_method_that_it_was_asked_for() {

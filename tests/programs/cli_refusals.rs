@@ -266,7 +266,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
         ("--quadrature simpson", &["--quadrature", "segment"]),
         (
             "--method ssao",
-            &["--method", "sat, shells, vicinity, histograms, fdao, spao, cones, lao, cao, rays"],
+            &["--method", "sat, shells, vicinity, histograms, dvao, fdao, spao, cones, lao, cao, rays"],
         ),
         ("--radius-mm -1", &["--radius-mm", "-1", ">= 0 mm"]),
         ("--radius-mm nan", &["--radius-mm", ">= 0 mm"]),
@@ -521,6 +521,16 @@ fn without_a_device_the_user_is_told_how_to_get_one() {
     {
         refused(&folder, arguments, FAILURE, &["no Vulkan device answers", "install"]);
     }
+}
+
+#[test]
+fn examples_ask_for_sources_that_there_are() {
+    let folder = Folder::without_device();
+    refused(&folder, "examples --count 1 -o out", USAGE, &["--builtin NAME", "--volume FILE"]);
+    refused(&folder, "examples --count 1 --builtin colour -o out", USAGE, &["colour", "beetle", "solids"]);
+    refused(&folder, "examples --count 0 --builtin fruit -o out", USAGE, &["--count"]);
+    refused(&folder, "examples --count 1 --builtin fruit --label max -o out", USAGE, &["mean or end"]);
+    refused(&folder, "examples --count 1 --volume absent.nrrd -o out", FAILURE, &["absent.nrrd"]);
 }
 
 #[test]

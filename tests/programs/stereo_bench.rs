@@ -4,12 +4,13 @@
 use crate::support::{Folder, cube_obj, nrrd};
 use serde_json::{Value, json};
 
-const METHODS: [&str; 12] = [
+const METHODS: [&str; 13] = [
     "solid",
     "sat",
     "shells",
     "vicinity",
     "histograms",
+    "dvao",
     "fdao",
     "spao",
     "cones",
@@ -88,6 +89,7 @@ fn check_method(method: &Value, name: &str, table: &Table) {
         "shells" => "mean",
         "vicinity" => "visible",
         "histograms" => "histogram",
+        "dvao" => "network",
         "spao" => "product",
         "cones" => "cone",
         "rays" | "fdao" => "hybrid",
@@ -211,7 +213,10 @@ fn tables_name_every_method_and_say_how_it_was_measured() {
         ("device", ""),
         ("machine", "threads"),
         ("volume", "builtin:engine:16"),
-        ("method", "solid sat shells vicinity histograms fdao spao cones lao cao cao-literal rays, rays 6"),
+        (
+            "method",
+            "solid sat shells vicinity histograms dvao fdao spao cones lao cao cao-literal rays, rays 6",
+        ),
         ("views", "2 of 32 x 24 pixels"),
         ("clip", "sphere"),
         ("frames", "6 for each method: 2 runs of 3"),
@@ -384,7 +389,7 @@ fn what_cannot_be_measured_is_refused_before_a_device_is_asked_for() {
         (
             "--methods lao,vray",
             2,
-            "expected one of solid, sat, shells, vicinity, histograms, fdao, spao, cones, lao, cao, cao-literal, rays",
+            "expected one of solid, sat, shells, vicinity, histograms, dvao, fdao, spao, cones, lao, cao, cao-literal, rays",
         ),
         ("--methods lao,lao", 2, "lao is given twice"),
         ("--scale colour", 2, "expected one of size, rays, radius, resolution, views"),

@@ -11,8 +11,8 @@ use cao_model::look::Look;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
-use cao_testing::methods;
 use cao_testing::wgsl::{bind, compile};
+use cao_testing::{methods, renderer_of};
 
 const FIRST: Stage = Stage::new("first", Phase::Ambient);
 const SECOND: Stage = Stage::new("second", Phase::Draw);
@@ -93,7 +93,7 @@ fn a_renderer_lives_on_a_hosts_device_and_in_its_command_buffer() {
         let clips = [Clip::remove(Shape::Torus)];
         let renderer = |gpu: &Gpu| {
             let mut renderer =
-                Renderer::new(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
+                renderer_of(gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
             renderer.set_clips(&clips).unwrap();
             renderer
         };
@@ -170,8 +170,7 @@ fn older_instances_and_queues_without_graphics_give_the_same_picture() {
         let gpu = host.adopted_for(Some(host.queue), compute_only);
         assert!(gpu.on_trust().iter().any(|what| what.contains("synchronization2")), "{:?}", gpu.on_trust());
         let setup = Setup::new(volume.min_spacing());
-        let mut renderer =
-            Renderer::new(&gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
+        let mut renderer = renderer_of(&gpu, &volume, transfer.clone(), setup, Format::Rgba16Float).unwrap();
         renderer.set_clips(&[Clip::remove(Shape::Torus)]).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         let (image, timings) = renderer.draw(&views, &Look::default(), [16, 16]).unwrap();

@@ -52,8 +52,7 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
     let mut random = Random::new(seed);
     let mut scene = scene_up_to(21, &mut random, name, method);
     // One renderer under budgets, and one that does everything at once.
-    let make =
-        || Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
+    let make = || renderer_of(gpu, &scene.volume, scene.transfer.clone(), scene.setup, cao::renderer::COLOUR);
     let (mut renderer, mut at_once) = (make().unwrap(), make().unwrap());
     let mut told = VecDeque::new();
     let mut history = Vec::new();
@@ -68,10 +67,11 @@ fn frames(gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> Se
             let kind = if random.below(40) == 0 { 6 } else { kind };
             let (mut again, mut same) = (scene.clone(), random.clone());
             again.edit_of(kind, &mut same, &mut at_once);
+            let coloured = scene.setup.coloured();
             let edit = scene.edit_of(kind, &mut random, &mut renderer);
             edited = true;
-            // Another method had its own volume.
-            if edit.ends_with("and back") {
+            // Another method had its own volume, and so has light in colours.
+            if edit.ends_with("and back") || scene.setup.coloured() != coloured {
                 volumes = vec![vec![1.0_f32.to_bits(); scene.volume.len()]];
                 told.clear();
             }
@@ -192,7 +192,7 @@ fn moving(gpu: &Gpu, method: Method) -> Renderer {
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let mut setup = Setup::of(method, 1.0);
     setup.occlusion.radius_mm = 4.0;
-    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, cao::renderer::COLOUR).unwrap();
+    let mut renderer = renderer_of(gpu, &volume, transfer, setup, cao::renderer::COLOUR).unwrap();
     renderer.update(&mut |_| ()).unwrap();
     renderer
 }

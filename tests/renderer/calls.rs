@@ -244,7 +244,7 @@ proptest! {
         let volume = builtin_box("engine", [9, 10, 8], [1.0, 0.8, 1.5]).unwrap();
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
         let sound = Setup { maps: MapSettings { resolution: 64, cells: 32, ..MapSettings::default() }, ..Setup::new(0.8) };
-        let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), sound, COLOUR).unwrap();
+        let mut renderer = renderer_of(&gpu, &volume, transfer.clone(), sound, COLOUR).unwrap();
         let shapes = shapes();
         let (mut done, mut refused) = (0, 0);
         for call in &calls {

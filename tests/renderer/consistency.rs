@@ -42,7 +42,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, rays: RaySet, method: Method) -> Rendere
         maps: MapSettings { resolution: 128, cells: 64, pairs: 4, literal: false },
     };
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap()
+    renderer_of(gpu, volume, transfer, setup, COLOUR).unwrap()
 }
 
 #[test]

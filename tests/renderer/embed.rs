@@ -11,7 +11,7 @@ use cao_model::settings::{MapSettings, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 
-use cao_testing::{kinds, methods};
+use cao_testing::{kinds, methods, renderer_of};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ fn renderer(gpu: &Gpu, method: Method) -> Renderer {
     let volume = cao_formats::open("builtin:engine:24").unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
     let setup = Setup::of(method, volume.min_spacing());
-    Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap()
+    renderer_of(gpu, &volume, transfer, setup, COLOUR).unwrap()
 }
 
 fn clip(shape: Shape, at: f32) -> Clip {
@@ -267,7 +267,7 @@ fn an_update_is_one_submission_of_few_commands() {
     let mut setup = Setup::new(volume.min_spacing());
     // Far from a tenth of a second on any device.
     setup.occlusion.radius_mm = 3.0;
-    let mut r = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
+    let mut r = renderer_of(&gpu, &volume, transfer.clone(), setup, COLOUR).unwrap();
     r.update(&mut |_| ()).unwrap();
     type Change<'a> = &'a dyn Fn(&mut Renderer);
     let mesh = [clip(Shape::Mesh(Arc::new(TriangleMesh::torus(24, 12))), 2.0)];

@@ -41,7 +41,7 @@ fn setup(rays: RaySet, quadrature: Quadrature, radius_mm: f32, scope: Scope) -> 
 
 fn renderer(gpu: &Gpu, volume: &Volume, setup: Setup) -> Renderer {
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap()
+    renderer_of(gpu, volume, transfer, setup, COLOUR).unwrap()
 }
 
 /// Updates and compares with a full recomputation.

@@ -71,8 +71,7 @@ impl Window {
 fn frames(host: &Host, gpu: &Gpu, name: &str, method: Method, seed: u64, frames: usize) -> usize {
     let mut random = Random::new(seed);
     let mut scene = scene(&mut random, name, method);
-    let mut renderer =
-        Renderer::new(gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR).unwrap();
+    let mut renderer = renderer_of(gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR).unwrap();
     let window = Window::new(gpu, &scene);
     let (mut history, mut compared) = (Vec::new(), 0);
     for frame in 0..frames {
@@ -162,7 +161,7 @@ fn a_picture_needs_an_update_first() {
         let mut random = Random::new(80);
         let scene = scene(&mut random, "engine", method);
         let mut renderer =
-            Renderer::new(&gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR).unwrap();
+            renderer_of(&gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR).unwrap();
         let window = Window::new(&gpu, &scene);
         run(&gpu, |rec| {
             let error = window.draw(rec, &renderer).unwrap_err().to_string();

@@ -53,7 +53,7 @@ fn without_memory_what_was_there_stays_in_use() {
         let mut failed = 0;
         loop {
             gpu.fail_after(Some(failed));
-            let made = Renderer::new(&gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR);
+            let made = renderer_of(&gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR);
             gpu.fail_after(None);
             match made {
                 Ok(_) => break,
@@ -169,7 +169,7 @@ fn volumes_behind_one_another_are_laid_over_from_the_back() {
         let volume = builtin_box(name, [12, 12, 12], [1.0; 3]).unwrap();
         let colour = vec![[0.0, 1.0, 0.4, 0.2]];
         let transfer = TransferFunction::new(vec![[0.0, 0.0], [255.0, opacity]], colour, None).unwrap();
-        let mut renderer = Renderer::new(&gpu, &volume, transfer, Setup::new(1.0), COLOUR).unwrap();
+        let mut renderer = renderer_of(&gpu, &volume, transfer, Setup::new(1.0), COLOUR).unwrap();
         renderer.set_clips(&[Clip::remove(Shape::Sphere)]).unwrap();
         renderer.update(&mut |_| ()).unwrap();
         renderer
@@ -249,7 +249,7 @@ fn without_anything_optional_the_picture_is_the_same() {
         let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
         for method in methods() {
             let setup = Setup::of(method, 1.0);
-            let make = |gpu: &Gpu| Renderer::new(gpu, volume, transfer.clone(), setup, COLOUR);
+            let make = |gpu: &Gpu| renderer_of(gpu, volume, transfer.clone(), setup, COLOUR);
             let mut there = make(&all).unwrap();
             if ![Method::Lao, Method::Cao].contains(&method) {
                 let refused = make(&plain).map(drop).unwrap_err().to_string();
@@ -282,7 +282,7 @@ fn resizes_and_formats_leave_nothing_behind() {
     let gpu = open();
     let volume = builtin_box("fruit", [10, 10, 10], [1.0; 3]).unwrap();
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    let mut renderer = Renderer::new(&gpu, &volume, transfer, Setup::new(1.0), Format::Rgba8Srgb).unwrap();
+    let mut renderer = renderer_of(&gpu, &volume, transfer, Setup::new(1.0), Format::Rgba8Srgb).unwrap();
     renderer.update(&mut |_| ()).unwrap();
     let views = eyes(&volume, 30.0);
     let mut reports = Vec::new();

@@ -37,7 +37,7 @@ fn renderer(gpu: &Gpu, volume: &Volume, method: Method) -> Renderer {
         maps: MapSettings { resolution: 64, cells: 32, pairs: 2, literal: false },
     };
     let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
-    Renderer::new(gpu, volume, transfer, setup, COLOUR).unwrap()
+    renderer_of(gpu, volume, transfer, setup, COLOUR).unwrap()
 }
 
 fn mesh(mesh: Arc<TriangleMesh>, scale: f32) -> Clip {
@@ -148,7 +148,7 @@ fn failures_in_the_middle_leave_nothing_behind() {
         transfer.opacity.clear();
         let setup = *one.setup();
         drop(one);
-        assert!(Renderer::new(&gpu, &volume, transfer, setup, COLOUR).is_err());
+        assert!(renderer_of(&gpu, &volume, transfer, setup, COLOUR).is_err());
         assert_eq!(gpu.memory_report(), []);
     }
     close(gpu);

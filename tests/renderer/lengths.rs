@@ -1,6 +1,6 @@
 //! Lengths are relative to the volume: the same scene in other units is the same picture.
 
-use cao::renderer::{COLOUR, Renderer, StereoImage};
+use cao::renderer::{COLOUR, StereoImage};
 use cao_formats::Picture;
 use cao_gpu::Gpu;
 use cao_measure::exactness::{Plan, verify};
@@ -47,7 +47,7 @@ fn shown(gpu: &Gpu, method: Method, unit: f32) -> Shown {
             ..Clip::remove(Shape::Plane)
         },
     ];
-    let mut renderer = Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap();
+    let mut renderer = renderer_of(gpu, &volume, transfer, setup, COLOUR).unwrap();
     renderer.set_clips(&clips).unwrap();
     renderer.update(&mut |_| ()).unwrap();
     let fitting = Fitting {
@@ -132,7 +132,7 @@ fn clips_are_exact_in_any_units() {
             let volume = builtin_box("fruit", [24; 3], [unit; 3]).unwrap();
             let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
             let setup = Setup::of(method, unit);
-            let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR).unwrap();
+            let mut renderer = renderer_of(&gpu, &volume, transfer, setup, COLOUR).unwrap();
             let plan =
                 Plan { shapes: vec![Shape::Sphere, Shape::Plane, Shape::Mesh(concave())], poses, seed: 1 };
             let report = verify(&mut renderer, &plan, &mut |_| ()).unwrap();
@@ -153,7 +153,7 @@ fn limits_of_clips_are_relative_to_the_volume() {
             let half = 8.0 * unit * 3.0_f32.sqrt();
             let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
             let mut renderer =
-                Renderer::new(&gpu, &volume, transfer, Setup::of(method, unit.into()), COLOUR).unwrap();
+                renderer_of(&gpu, &volume, transfer, Setup::of(method, unit.into()), COLOUR).unwrap();
             let clip = |shape: &Shape, scale: f32, at: f32| {
                 let pose = Pose {
                     scale: Vec3::splat(scale * half),

@@ -7,6 +7,7 @@ mod calls;
 mod consistency;
 mod contextual;
 mod deform;
+mod dvao;
 mod edits;
 mod embed;
 mod exactness;

@@ -7,13 +7,13 @@ use cao_measure::exactness::{Plan, verify};
 use cao_model::clip::Shape;
 use cao_model::methods::Method;
 use cao_model::settings::Setup;
-use cao_testing::{close, kinds, methods, open};
+use cao_testing::{close, kinds, methods, open, renderer_of};
 
 fn renderer(gpu: &Gpu, volume: &str, method: Method) -> Renderer {
     let volume = cao_formats::open(volume).unwrap();
     let transfer = cao_formats::transfer::load("auto", volume.range()).unwrap();
     let setup = Setup::of(method, volume.min_spacing());
-    Renderer::new(gpu, &volume, transfer, setup, COLOUR).unwrap()
+    renderer_of(gpu, &volume, transfer, setup, COLOUR).unwrap()
 }
 
 /// As `cao verify --method all` has it. In the second volume a plane often changes bricks at both ends of long axes, and nothing

@@ -48,8 +48,7 @@ pub struct Scene {
 
 impl Scene {
     pub fn renderer(&self, gpu: &Gpu) -> Renderer {
-        let mut renderer =
-            Renderer::new(gpu, &self.volume, self.transfer.clone(), self.setup, COLOUR).unwrap();
+        let mut renderer = renderer_of(gpu, &self.volume, self.transfer.clone(), self.setup, COLOUR).unwrap();
         renderer.set_clips(&self.clips).unwrap();
         renderer.set_features(self.features.clone()).unwrap();
         renderer.update(&mut |_| ()).unwrap();
@@ -101,6 +100,9 @@ impl Scene {
                 }
                 if next.method.entry().options.contains(&"bleeding") && random.below(2) == 0 {
                     next.options.set("bleeding", ["0", "0.7"][pick(random, 2)]).unwrap();
+                }
+                if next.method.entry().options.contains(&"grid") && random.below(2) == 0 {
+                    next.options.set("grid", ["whole", "tiles"][pick(random, 2)]).unwrap();
                 }
                 if next.method.entry().options.contains(&"levels") && random.below(2) == 0 {
                     let form = ["nbuffer", "mip", "mixed:1", "reversed:2"][pick(random, 4)];

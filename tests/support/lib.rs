@@ -21,6 +21,7 @@ use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::light::AmbientLight;
 use cao_model::mesh::TriangleMesh;
 use cao_model::methods::{METHODS, Method};
+use cao_model::network::{Label, Shape as NetworkShape};
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::values::Values;
@@ -271,6 +272,26 @@ pub fn half_float(bits: u16) -> f32 {
 pub fn eyes(volume: &Volume, azimuth_deg: f32) -> [View; 2] {
     let far = 8.0 * volume.size_mm().iter().sum::<f64>() as f32;
     StereoRig::framing(volume.size_mm(), azimuth_deg, 20.0).views(1.0, far * 1e-3, far).unwrap()
+}
+
+/// As [`Renderer::new`]; of method `dvao` with a network of some hundred weights, since what holds for one holds for all, and the one that is shipped
+/// takes a software driver a second for a small volume.
+pub fn renderer_of(
+    gpu: &Gpu,
+    volume: &Volume,
+    transfer: TransferFunction,
+    setup: Setup,
+    colour: Format,
+) -> cao::Result<Renderer> {
+    let deep = setup.method == Method::Deep;
+    let first = if deep { Setup::new(volume.min_spacing()) } else { setup };
+    let mut renderer = Renderer::new(gpu, volume, transfer, first, colour)?;
+    let shape = NetworkShape { edge: 16, filters: 4, cap: 8, levels: 2, label: Label::Mean };
+    renderer.set_network(network(shape, 1))?;
+    if deep {
+        renderer.set_setup(setup)?;
+    }
+    Ok(renderer)
 }
 
 /// A renderer without occlusion, up to date: for what knows opacities and light only.

@@ -30,6 +30,21 @@ pub struct Input<'a> {
     pub norm: u32,
 }
 
+/// What the last convolution gives, and to where.
+#[derive(Clone, Copy)]
+pub struct Given<'a> {
+    /// A grid of f32,
+    pub values: &'a Buffer,
+    /// of so many voxels.
+    pub dims: [u32; 3],
+    /// Where in it the first voxel would be.
+    pub at: [i32; 3],
+    /// The voxels that are given begin at this one
+    pub low: [u32; 3],
+    /// and end before this one.
+    pub high: [u32; 3],
+}
+
 /// What a convolution goes over.
 #[derive(Clone, Copy)]
 pub struct Over<'a> {
@@ -91,16 +106,18 @@ impl Conv3 {
         rec.dispatch(pipeline, &binds, bytemuck::bytes_of(&params), [items.len() as u32, 1, 1])
     }
 
-    /// Some items of the last convolution, to the grid.
+    /// Some items of the last convolution.
     pub fn record_last(
         &self,
         rec: &mut Recorder,
         over: Over,
         inputs: [Input; 2],
-        values: &Buffer,
+        to: Given,
         items: Range<u32>,
     ) -> Result<()> {
-        let params = params(over.dims, &inputs, 1, items.start);
+        let Given { values, dims, at, low, high } = to;
+        let params =
+            kernel::Conv3Params { given: dims, at, low, high, ..params(over.dims, &inputs, 1, items.start) };
         let binds = kernel::LastBindings {
             source: inputs[0].tensor,
             beside: inputs[1].tensor,
@@ -121,7 +138,7 @@ fn params(dims: [u32; 3], inputs: &[Input], out_blocks: u32, base: u32) -> kerne
         norm_beside: inputs.last().map_or(0, |input| input.norm),
         out_blocks,
         base,
-        pad: Default::default(),
+        ..bytemuck::Zeroable::zeroed()
     }
 }
 

@@ -4,10 +4,10 @@
 //! Memory: 2 bytes a weight, 64 / 27 of that where what goes in is doubled; tensors as [`Plan`] has them; 8 bytes a voxel of
 //! the grid.
 
-use super::conv3::{self, Conv3, Form, Input, Over};
+use super::conv3::{self, Conv3, Form, Given, Input, Over};
 use super::moments::{self, Moments, NORM, PARTIAL};
 use super::plan::{Plan, Step};
-use super::resize::{self, Grid, Resize};
+use super::resize::{self, Resize};
 use crate::drive::Part;
 use crate::host::device_buffer;
 use crate::stages;
@@ -64,14 +64,29 @@ pub struct Scratch {
     norms: Buffer,
     /// What goes in, an f32 a voxel.
     pub grid: Buffer,
-    /// What comes out, an f32 a voxel.
+    /// What comes out, an f32 a voxel of the volume's whole grid.
     pub values: Buffer,
+    /// Voxels of that grid.
+    pub given: [u32; 3],
     slice: f64,
 }
 
+/// A part of the volume's grid that the network sees at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Where in it the volume begins.
+    pub before: [i32; 3],
+    /// Where it begins in the volume's grid.
+    pub at: [i32; 3],
+    /// Its values are taken from this voxel of it
+    pub low: [u32; 3],
+    /// up to this one.
+    pub high: [u32; 3],
+}
+
 impl Scratch {
-    /// Allocates it. Uses the device's queue and waits for it.
-    pub fn new(gpu: &Gpu, plan: Plan) -> Result<Self> {
+    /// Allocates it, for windows of the plan's grid and a volume's grid of `given` voxels. Uses the device's queue and waits for it.
+    pub fn new(gpu: &Gpu, plan: Plan, given: [u32; 3]) -> Result<Self> {
         let device = |name: &str, bytes: u64| gpu.buffer(name, bytes, BufferUse::Device);
         let voxels: u64 = plan.dims.iter().map(|d| u64::from(*d)).product();
         let most =
@@ -89,7 +104,8 @@ impl Scratch {
             partials: device("partial moments", PARTIAL * u64::from(parts))?,
             norms,
             grid: device("grid", 4 * voxels)?,
-            values: device("values", 4 * voxels)?,
+            values: device("values", 4 * given.iter().map(|d| u64::from(*d)).product::<u64>())?,
+            given,
             slice: if gpu.info().kind == DeviceKind::Cpu { SLICE } else { f64::INFINITY },
             plan,
         })
@@ -126,22 +142,32 @@ impl Scratch {
         (0..items).step_by(each as usize).map(move |first| first..(first + each).min(items))
     }
 
-    /// The grid from V_o, whose opacities are raised to `exponent`.
+    /// The grid from V_o, in which the volume lies as this window has it, whose opacities are raised to `exponent`.
     pub fn shrink<'a>(
         &'a self,
         kernels: &'a Kernels,
         opacity: &'a Image,
-        grid: &'a Grid,
+        window: &'a Window,
+        voxel: [f32; 3],
         exponent: f32,
     ) -> impl Iterator<Item = Part<'a>> {
-        let voxels: u32 = self.plan.dims.iter().product();
-        let samples =
-            grid.voxel.iter().map(|voxel| f64::from((1.0 / voxel).max(1.0).ceil())).product::<f64>();
+        let dims = self.plan.dims;
+        let samples = f64::from(resize::samples(voxel).iter().product::<u32>());
         let cost = TOUCHED * samples * f64::from(cao_kernels::resize::TEAM);
-        self.slices((resize::items(voxels), cost)).map(move |items| {
+        self.slices((resize::items(dims.iter().product()), cost)).map(move |items| {
             Part::long(stages::GRID, move |rec| {
                 rec.barrier(&ALL, &ALL);
-                Ok(kernels.resize.record_shrink(rec, opacity, (&self.grid, grid), exponent, items.clone())?)
+                let (resize, before) = (&kernels.resize, window.before);
+                Ok(resize.record_shrink(
+                    rec,
+                    opacity,
+                    &self.grid,
+                    dims,
+                    before,
+                    voxel,
+                    exponent,
+                    items.clone(),
+                )?)
             })
         })
     }
@@ -152,9 +178,11 @@ impl Scratch {
         kernels: &'a Kernels,
         weights: &'a Weights,
         step: &'a Step,
+        window: &'a Window,
     ) -> impl Iterator<Item = Part<'a>> {
         self.slices(self.items(step)).map(move |items| {
-            let record = move |rec: &mut Recorder| self.record(rec, kernels, weights, step, items.clone());
+            let record =
+                move |rec: &mut Recorder| self.record(rec, kernels, weights, (step, window), items.clone());
             Part::long(stages::NETWORK, move |rec| Ok(record(rec)?))
         })
     }
@@ -183,7 +211,7 @@ impl Scratch {
         rec: &mut Recorder,
         kernels: &Kernels,
         weights: &Weights,
-        step: &Step,
+        (step, window): (&Step, &Window),
         items: Range<u32>,
     ) -> Result<()> {
         rec.barrier(&ALL, &ALL);
@@ -215,7 +243,9 @@ impl Scratch {
             }
             Step::Last { layer, of, beside } => {
                 let inputs = [self.input(of, true), self.input(beside, true)];
-                kernels.conv3.record_last(rec, over(layer, 0), inputs, &self.values, items)
+                let Window { at, low, high, .. } = *window;
+                let to = Given { values: &self.values, dims: self.given, at, low, high };
+                kernels.conv3.record_last(rec, over(layer, 0), inputs, to, items)
             }
         }
     }

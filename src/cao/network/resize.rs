@@ -8,7 +8,7 @@ use cao_gpu::{Buffer, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
 use cao_kernels::resize as kernel;
 use std::ops::Range;
 
-/// Where a volume lies in the grid of a network.
+/// Where a volume lies in the grid of its ambient values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     /// Voxels of the grid.
@@ -36,26 +36,29 @@ impl Resize {
         })
     }
 
-    /// Some workgroups' voxels of the grid, from V_o; opacities are raised to `exponent`.
+    /// Some workgroups' voxels of a grid of `dims`, in which the volume, voxels of this size in voxels of the grid, begins at `before`, from V_o;
+    /// opacities are raised to `exponent`.
+    #[expect(clippy::too_many_arguments, reason = "settings and bindings of the kernel, each named once")]
     pub fn record_shrink(
         &self,
         rec: &mut Recorder,
         opacity: &Image,
-        to: (&Buffer, &Grid),
+        grid: &Buffer,
+        dims: [u32; 3],
+        before: [i32; 3],
+        voxel: [f32; 3],
         exponent: f32,
         items: Range<u32>,
     ) -> Result<()> {
-        let (grid, of) = to;
         let edges = opacity.desc().dims;
         let params = kernel::ResizeParams {
-            dims: of.dims,
-            count: of.dims.iter().product(),
-            voxel: std::array::from_fn(|i| 1.0 / (of.voxel[i] * edges[i] as f32)),
+            dims,
+            count: dims.iter().product(),
+            voxel: std::array::from_fn(|i| 1.0 / (voxel[i] * edges[i] as f32)),
             exponent,
-            // Rounding must not make one more.
-            samples: of.voxel.map(|voxel| (0.999 / voxel).ceil().max(1.0) as u32),
+            samples: samples(voxel),
             base: items.start * kernel::TEAM,
-            before: of.before,
+            before,
             pad: Default::default(),
         };
         let binds = kernel::ShrinkBindings { opacity, field: &self.field, grid };
@@ -81,6 +84,12 @@ impl Resize {
         let binds = kernel::HalveBindings { source, out };
         rec.dispatch(&self.halve, &binds, bytemuck::bytes_of(&params), [items.len() as u32, 1, 1])
     }
+}
+
+/// Samples of V_o for a voxel of the grid along each axis.
+pub fn samples(voxel: [f32; 3]) -> [u32; 3] {
+    // Rounding must not make one more.
+    voxel.map(|voxel| (0.999 / voxel).ceil().max(1.0) as u32)
 }
 
 /// Workgroups for so many voxels.

@@ -117,6 +117,8 @@ enum CaoMethod
     CAO_METHOD_SPAO = 8,
     // Cone tracing.
     CAO_METHOD_CONES = 9,
+    // Deep volumetric ambient occlusion, by the network that is shipped: every update runs it whole.
+    CAO_METHOD_DEEP = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

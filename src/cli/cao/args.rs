@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 pub use cao_cli::args::{Global, Parts, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
-use cao_cli::args::{length, methods_help, number, positive, size, three, triple};
+use cao_cli::args::{length, methods_help, network, number, positive, size, three, triple};
 use cao_measure::stability::Trial;
 use cao_model::METHODS;
 use cao_model::clip::{Clip, Mode, Pose};
@@ -11,7 +11,7 @@ use cao_model::fit::Fit;
 use cao_model::frame::Frame;
 use cao_model::look::{LightFrom, Shading};
 use cao_model::methods::Method;
-use cao_model::network::Label;
+use cao_model::network::{Label, Network};
 use cao_model::occlusion::Quadrature;
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use clap::{ArgAction, ArgMatches, Args, Parser, Subcommand};
@@ -368,6 +368,9 @@ pub struct Chart {
     /// Table 3 of the paper of method dvao instead: its network beside rays, with likeness, time and memory
     #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm", "paper", "fdao"])]
     pub dvao: bool,
+    /// With --dvao: weight file of another network, for either truth [default: the one that is built in]
+    #[arg(long, value_name = "FILE", value_parser = network, requires = "dvao")]
+    pub network: Option<Network>,
     /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms
     #[arg(long, value_name = "FILE", requires = "paper")]
     pub data: Vec<OsString>,

@@ -12,7 +12,7 @@ use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
 use cao_model::error::shown_path;
-use cao_model::network::Label;
+use cao_model::network::{Label, Network};
 use serde_json::json;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -211,7 +211,7 @@ fn dvao(global: &Global, args: &Args) -> Result<ExitCode> {
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let plan = chart::deep::Plan::of(&gpu, args.quick, args.runs);
-    let network = cao::network::small();
+    let network = args.network.clone().unwrap_or_else(Network::small);
     progress.stage("measuring");
     let found = chart::deep::measure(&gpu, &network, &plan, &mut |what, share| {
         progress.say(what);

@@ -30,6 +30,7 @@ pub fn run(global: &Global, args: &Occlusion, matches: &ArgMatches) -> Result<Ex
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
+    args.settings.give_network(&mut renderer)?;
     renderer.set_clips(&turn.clips(&clips))?;
     renderer.set_features(features.clone())?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;

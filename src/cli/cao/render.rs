@@ -70,6 +70,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let gpu = open_gpu(global)?;
     let bands = Bands::new(&gpu, size, 2)?;
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
+    args.settings.give_network(&mut renderer)?;
     renderer.set_clips(&turn.clips(&scene.clips))?;
     renderer.set_features(features.clone())?;
     let planned = budget::plan(&mut renderer, &args.budget, &args.settings, args.method, &mut progress)?;

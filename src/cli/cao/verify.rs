@@ -56,6 +56,7 @@ pub fn run(global: &Global, args: &Verify) -> Result<ExitCode> {
         for setup in setups {
             progress.stage("preparing");
             let mut renderer = Renderer::new(&gpu, &volume, transfer.clone(), setup, COLOUR)?;
+            args.settings.give_network(&mut renderer)?;
             renderer.set_features(features.clone())?;
             let plan = Plan { shapes: shapes.clone(), poses: args.poses, seed: args.seed };
             progress.stage("verifying");

@@ -11,6 +11,7 @@ use cao_gpu::{Counts, Gpu, Phase, Timings};
 use cao_measure::split::Split;
 use cao_model::clip::Shape;
 use cao_model::look::Look;
+use cao_model::network::Network;
 use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
@@ -23,6 +24,8 @@ pub struct Input {
     pub name: String,
     pub volume: Volume,
     pub transfer: TransferFunction,
+    /// Of method dvao, another than the one that is built in.
+    pub network: Option<Network>,
 }
 
 /// Everything that may be varied.
@@ -163,7 +166,10 @@ impl<'a> Runner<'a> {
     ) -> Result<Self> {
         let input = &configuration.input;
         let setup = method.setup(configuration.setup);
-        let renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
+        let mut renderer = Renderer::new(gpu, &input.volume, input.transfer.clone(), setup, COLOUR)?;
+        if let Some(network) = &input.network {
+            renderer.set_network(network.clone())?;
+        }
         let measured = Measured { method, runs: Vec::new() };
         let mut runner = Self { configuration, target: target.clone(), renderer, measured };
         runner.move_clip(plan, -1 - i64::from(plan.warm_up))?;

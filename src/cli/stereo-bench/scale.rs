@@ -99,7 +99,13 @@ fn resized(base: &Configuration, share: f64, transfer: &OsStr) -> Result<(String
     let [sx, sy, sz] = volume.spacing;
     let spacing = if volume.spacing == [1.0; 3] { String::new() } else { format!(":{sx},{sy},{sz}") };
     let name = format!("builtin:{scene}:{}{spacing}", in_words(dims));
-    Ok((in_words(dims), Configuration { input: Rc::new(Input { name, volume, transfer }), ..base.clone() }))
+    Ok((
+        in_words(dims),
+        Configuration {
+            input: Rc::new(Input { name, volume, transfer, network: base.input.network.clone() }),
+            ..base.clone()
+        },
+    ))
 }
 
 fn in_words([x, y, z]: [usize; 3]) -> String {

@@ -175,6 +175,11 @@ fn base(cli: &Cli, transfer: &OsStr) -> Result<Configuration> {
     let setup = setup(&cli.settings, &volume, method, cli.all_voxels)?;
     let transfer = cao_formats::transfer::load(transfer, volume.range());
     let transfer = args::transfer(transfer, &mut volume, &cli.input)?;
-    let input = Rc::new(Input { name: shown_path(&cli.input), volume, transfer });
+    let input = Rc::new(Input {
+        name: shown_path(&cli.input),
+        volume,
+        transfer,
+        network: cli.settings.network.clone(),
+    });
     Ok(Configuration { input, setup, size: cli.size, views: cli.views })
 }

@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn names_stay_and_every_method_is_there() {
         let names: Vec<_> = Way::all().into_iter().map(Way::name).collect();
-        let methods = ["sat", "shells", "vicinity", "histograms", "fdao", "spao", "cones"];
+        let methods = ["sat", "shells", "vicinity", "histograms", "dvao", "fdao", "spao", "cones"];
         let ways = methods.into_iter().chain(["lao", "cao", "cao-literal", "rays"]);
         assert_eq!(names, std::iter::once("solid").chain(ways).collect::<Vec<_>>());
         for way in Way::all() {

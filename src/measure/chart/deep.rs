@@ -244,7 +244,11 @@ impl<'a> Stand<'a> {
         let base = Setup::of(method, 1.0);
         let occlusion = Occlusion { rays, quadrature: rule, radius_mm: self.radius as f32, ..base.occlusion };
         let setup = Setup { occlusion, scope: Scope::All, ..base };
-        Ok(Renderer::new(self.gpu, &self.volume, self.transfer.clone(), setup, COLOUR)?)
+        let mut renderer = Renderer::new(self.gpu, &self.volume, self.transfer.clone(), setup, COLOUR)?;
+        if of == Of::Network {
+            renderer.set_network(self.network.clone())?;
+        }
+        Ok(renderer)
     }
 
     /// What the label stands for, at every voxel, by so many directions.

@@ -129,17 +129,3 @@ impl<'a> Maker<'a> {
         Err(crate::Error::refused(&format!("source {}", source.name()), problem))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Only what is random: labels need a device (tests/kernels/examples.rs).
-    #[test]
-    fn every_source_shows_something() {
-        for name in ["engine", "fruit", "beetle", "skeleton", "bucky"] {
-            let scan = Source::Builtin(name.into()).scan(&mut Random::new(1)).unwrap();
-            assert!(scan.peaks.len() > 1, "{name} {:?}", scan.peaks);
-        }
-    }
-}

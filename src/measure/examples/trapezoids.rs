@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn trapezoids_keep_their_rules() {
         let mut random = Random::new(5);
-        let peaks = [0.01, 0.2, 0.22, 0.5, 0.55, 0.8, 0.999];
+        let peaks = [0.01, 0.15, 0.3, 0.33, 0.45, 0.6, 0.75, 0.9, 0.999];
         let mut counts = [0; 6];
         for _ in 0..500 {
             let found = transfer(&mut random, &peaks);

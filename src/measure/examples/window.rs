@@ -129,7 +129,8 @@ mod tests {
         Scan::new("ball", &Volume::new(dims, spacing, Values::F32(values)).unwrap())
     }
 
-    const SHOWN: [Trapezoid; 1] = [Trapezoid { centre: 0.5, outer: 0.1, inner: 0.1, bottom: 0.8, top: 0.8 }];
+    /// From half the ball's value on, so that its surface is where it is, whatever lies between voxels.
+    const SHOWN: [Trapezoid; 1] = [Trapezoid { centre: 0.5, outer: 0.5, inner: 0.5, bottom: 0.8, top: 0.8 }];
 
     /// Extent of what can be seen, in voxels.
     fn extent(opacity: &[[f32; 2]], edge: usize) -> [usize; 3] {

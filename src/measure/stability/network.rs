@@ -9,7 +9,6 @@ use crate::Result;
 use crate::error::{counting, errors, shape_errors};
 use crate::plot::short;
 use crate::random::Random;
-use cao::network::small;
 use cao_model::builtin::{builtin, builtin_box};
 use cao_model::network::Network;
 use cao_model::occlusion::{Integral, Occlusion, Quadrature, RaySet};
@@ -310,7 +309,7 @@ fn series(n: usize, name: String, points: Vec<[f64; 2]>) -> Series {
 
 /// Runs the trial, telling the share done.
 pub fn run(plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
-    let network = small();
+    let network = Network::small();
     let radius = network.shape().radius();
     let stand = Stand { network, radius, directions: plan.directions };
     let steps = Sweep::ALL.iter().map(|sweep| sweep.values(plan).len()).sum::<usize>() + plan.cuts.len();
