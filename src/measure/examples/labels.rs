@@ -49,7 +49,10 @@ impl<'a> Labels<'a> {
         let opacity = vec![[0.0, 0.0], [65535.0, 1.0]];
         let transfer = TransferFunction::new(opacity, vec![[0.0, 1.0, 1.0, 1.0]], Some(1.0))?;
         let setup = Setup::of(Method::Rays, 1.0);
-        let occlusion = Occlusion { rays: MEAN_RAYS, radius_mm: radius(edge) as f32, ..setup.occlusion };
+        // Whole steps up to the radius itself.
+        let radius_mm = radius(edge) as f32;
+        let step_mm = Some(radius_mm / radius_mm.round());
+        let occlusion = Occlusion { rays: MEAN_RAYS, radius_mm, step_mm, ..setup.occlusion };
         let setup = Setup { occlusion, scope: Scope::All, ..setup };
         let empty = volume(&grid, vec![0; grid.len()])?;
         let renderer = Renderer::new(gpu, &empty, transfer, setup, COLOUR)?;
