@@ -26,7 +26,7 @@ const MEAN_RAYS: RaySet = RaySet::Spiral(50);
 const END_RAYS: u32 = 64;
 /// Of the reference that labels are compared with: as many as make its own error small beside theirs.
 const CHECK: reference::Plan =
-    reference::Plan { max_voxels: 2000, directions: 1000, steps_per_voxel: 4, ..reference::Plan::FULL };
+    reference::Plan { max_voxels: 1000, directions: 512, steps_per_voxel: 4, ..reference::Plan::FULL };
 
 /// Length of the rays in voxels, of a cube of this edge.
 pub fn radius(edge: usize) -> f64 {
