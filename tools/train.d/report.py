@@ -50,7 +50,7 @@ def markdown(session, card, judged, weights, digest):
         f"# A network of label `{shape.label}`",
         "",
         f"{weights:,} weights: edge {shape.edge}, {shape.filters} filters, at most {shape.cap} channels, {shape.levels} levels."
-        + (f" SHA-256 {digest}." if digest else ""),
+        + (f" SHA-256 of all but its last 32 bytes, which are it: {digest}." if digest else ""),
         "",
         *[f"* {key}: {value}" for key, value in card.items()],
         "",
