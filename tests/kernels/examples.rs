@@ -65,7 +65,7 @@ fn a_seed_gives_the_same_examples_whatever_was_made_before() {
     let sources = || vec![Source::Builtin("fruit".into()), Source::Solids];
     let mut maker = Maker::new(&gpu, plan(3), sources()).unwrap();
     let [first, second] = [0, 1].map(|i| maker.make(i).unwrap());
-    let again = Maker::new(&gpu, plan(3), sources()).unwrap().make(1).unwrap();
+    let again = maker.make(1).unwrap();
     assert_eq!(
         (&again.opacity, &again.labels, &again.transfer),
         (&second.opacity, &second.labels, &second.transfer)

@@ -14,3 +14,4 @@ mod readings;
 mod stereo_bench;
 mod support;
 mod targets;
+mod train;

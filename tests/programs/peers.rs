@@ -10,14 +10,14 @@ const TOOL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tools/peers");
 const ARGUMENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tools/peers.d/arguments.py");
 
 /// Exit code, standard output, standard error.
-fn run(command: &mut Command) -> (Option<i32>, String, String) {
+pub fn run(command: &mut Command) -> (Option<i32>, String, String) {
     let run = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (run.status.code(), text(run.stdout), text(run.stderr))
 }
 
 /// Whether what the tool asks of Python is there; without it the tool would install it.
-fn has_python() -> bool {
+pub fn has_python() -> bool {
     let found = Command::new("python3").args(["-c", "import ensurepip, venv"]).output();
     let found = found.is_ok_and(|run| run.status.success());
     if !found {

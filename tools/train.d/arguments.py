@@ -16,6 +16,7 @@ with CUDA) into its folder, says what it will take, trains, and writes into FOLD
 network.net, report.md, curve.csv and curve.svg. A second run goes on where the first ended.
 
   --minutes N       train so long             [default: until validation gets no better]
+  --steps N         so many steps instead, the same on any machine
   --label L         mean transmittance of rays, or at their end: mean, end [default: mean]
   --filters N --cap N --levels N --edge N   shape           [default: 8, 64, 5, 64]
   --injection I     preclassified, global, latent           [default: preclassified]
@@ -27,7 +28,8 @@ network.net, report.md, curve.csv and curve.svg. A second run goes on where the 
   --folder DIR      where everything is kept                [default: target/train]
   --run NAME        of this training        [default: of label, filters, injection, loss]
   --suite           three injections, five losses, three sizes, one after the other; --minutes
-                    are for all of them
+                    are for all of them, --steps for each
+  --check           check what trains against PyTorch's own operations, and do nothing else
   --plan            say what it would take, and do not train
   --pack DIR        only make everything that a machine without network needs; copy it there
                     with the repository, and then
@@ -72,6 +74,7 @@ def parser():
     found = Parser(prog="train")
     add = found.add_argument
     add("--minutes", type=minutes)
+    add("--steps", type=whole(1, 10**9))
     add("--label", choices=LABELS, default="mean")
     for name, value, least, most in (("filters", 8, 1, 1024), ("cap", 64, 1, 1024), ("levels", 5, 1, 9), ("edge", 64, 16, 512)):
         add(f"--{name}", type=whole(least, most), default=value)
@@ -85,6 +88,7 @@ def parser():
     add("--run")
     add("--suite", action="store_true")
     add("--plan", action="store_true")
+    add("--check", action="store_true")
     add("--pack", type=pathlib.Path)
     add("--from", dest="packed", type=pathlib.Path)
     # Where the script found or made the examples.
@@ -100,8 +104,10 @@ def parse(given=None):
         parser().error(f"--edge {args.edge}: expected a multiple of {1 << args.levels} for {args.levels} levels")
     if args.pack and args.packed:
         parser().error("--pack and --from: expected one of them")
-    if args.suite and not args.minutes and not args.pack:
-        parser().error("--suite needs --minutes, for all of its runs together")
+    if args.minutes and args.steps:
+        parser().error("--minutes and --steps: expected one of them")
+    if args.suite and not (args.minutes or args.steps or args.pack):
+        parser().error("--suite needs --minutes, for all of its runs together, or --steps, for each")
     args.run = args.run or f"{args.label}-{args.filters}-{args.injection}-{args.loss}"
     return args
 
@@ -119,7 +125,7 @@ def main():
         "seed": args.seed,
         "examples": args.examples,
         "phantoms": "yes" if args.phantoms else "",
-        "program": "suite.py" if args.suite else "train.py",
+        "program": "check.py" if args.check else "suite.py" if args.suite else "train.py",
     }
     for name, value in values.items():
         print(f"{name}={shlex.quote(str(value))}")

@@ -110,7 +110,7 @@ class Session:
         return out
 
     def validate(self):
-        """A row of the curve, and the rate halved where two did not get better (unless minutes say how it falls)."""
+        """A row of the curve, and the rate halved where two did not get better (unless it was planned how it falls)."""
         judged = [row for row in self.judge() if row["set"] == "validation"]
         mean = {key: sum(row[key] for row in judged) / len(judged) for key in ("loss", "ssim2", "ssim3", "mse")}
         row = {"minutes": self.seconds / 60, "step": self.steps, "rate": self.rate, "loss": self.sum / max(self.count, 1)}
@@ -121,7 +121,7 @@ class Session:
             self.best, self.stale = row["validation_loss"], 0
         else:
             self.stale += 1
-            if self.settings["minutes"] is None and self.stale % 2 == 0:
+            if not self.settings["planned"] and self.stale % 2 == 0:
                 self.rate /= 2
         return row
 

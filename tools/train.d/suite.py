@@ -1,4 +1,4 @@
-"""The trainings of tables 1 and 2 of DVAO, each for the same time, one after the other: five losses with opacity alone, two more
+"""The trainings of tables 1 and 2 of DVAO, each for the same time or of the same number of steps, one after the other: five losses with opacity alone, two more
 injections with the best loss, three sizes. Ends with tables.md; goes on where it ended."""
 
 import json
@@ -20,13 +20,13 @@ def runs(args):
     return list(dict.fromkeys(found))
 
 
-def train(args, run, minutes):
+def train(args, run, each):
     injection, loss, filters = run
     name = f"suite-{args.label}-{filters}-{injection}-{loss}"
     done = args.folder / "runs" / name / "judged.json"
     if not done.exists():
         command = [sys.executable, "-B", HERE / "train.py", "--folder", args.folder, "--data", args.data, "--run", name]
-        command += ["--injection", injection, "--loss", loss, "--filters", filters, "--cap", 8 * filters, "--minutes", minutes]
+        command += ["--injection", injection, "--loss", loss, "--filters", filters, "--cap", 8 * filters, *each]
         command += ["--label", args.label, "--edge", args.edge, "--levels", args.levels, "--seed", args.seed]
         command += ["--threads", args.threads] if args.threads else []
         print(f"--- {name}", flush=True)
@@ -34,8 +34,8 @@ def train(args, run, minutes):
     return json.loads(done.read_text())
 
 
-def tables(args, found, minutes):
-    lines = [f"Label `{args.label}`, {args.edge}³ voxels, {minutes:.1f} minutes each, seed {args.seed}.", ""]
+def tables(args, found, each):
+    lines = [f"Label `{args.label}`, {args.edge}³ voxels, {each[0]} {each[1]} each, seed {args.seed}.", ""]
     lines += ["| injection | loss | filters | weights | steps | SSIM-2D | SSIM-3D | MSE | unseen SSIM-2D | unseen MSE |", "|---" * 10 + "|"]
     for (injection, loss, filters), judged in found.items():
         card = judged["card"]
@@ -48,12 +48,12 @@ def tables(args, found, minutes):
 def main():
     args = arguments.parse()
     wanted = runs(args)
-    minutes = args.minutes / len(wanted)
-    print(f"{len(wanted)} trainings of {minutes:.1f} minutes each", flush=True)
+    each = ("--steps", args.steps) if args.steps else ("--minutes", round(args.minutes / len(wanted), 2))
+    print(f"{len(wanted)} trainings with {each[0]} {each[1]} each", flush=True)
     if args.plan:
         return
-    found = {run: train(args, run, minutes) for run in wanted}
-    (args.folder / "tables.md").write_text(tables(args, found, minutes))
+    found = {run: train(args, run, each) for run in wanted}
+    (args.folder / "tables.md").write_text(tables(args, found, each))
     print(f"wrote {args.folder / 'tables.md'}")
 
 

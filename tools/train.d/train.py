@@ -32,7 +32,7 @@ def open_session(args, shape):
         raise SystemExit(f"{args.data}: expected folders train… and validation… of `cao examples`")
     if examples.edge != args.edge:
         raise SystemExit(f"{args.data}: cubes of {examples.edge} voxels, asked for {args.edge}")
-    settings = {"shape": shape, "injection": args.injection, "loss": args.loss, "seed": args.seed, "minutes": args.minutes}
+    settings = {"shape": shape, "injection": args.injection, "loss": args.loss, "seed": args.seed, "planned": bool(args.minutes or args.steps)}
     return Session(settings, examples, checks)
 
 
@@ -44,7 +44,10 @@ def state(session, seconds, args):
         f"{processor()}: {seconds:.3f} s a step in {str(session.net.precision).removeprefix('torch.')}; {weights:,} weights; "
         f"{len(session.examples)} examples, {epoch:.1f} minutes an epoch",
     ]
-    if args.minutes is None:
+    if args.steps is not None:
+        left = max(args.steps - session.steps, 0)
+        lines.append(f"will take {left} steps, {left * seconds / 60:.1f} minutes")
+    elif args.minutes is None:
         lines.append(f"will take at most {EPOCHS} epochs, {EPOCHS * epoch:.0f} minutes")
     else:
         left = max(args.minutes - session.seconds / 60, 0)
@@ -52,9 +55,14 @@ def state(session, seconds, args):
     print("\n".join(lines), flush=True)
 
 
+def share(session, args):
+    """How much of what was asked for is done."""
+    return session.steps / args.steps if args.steps else session.seconds / 60 / args.minutes
+
+
 def over(session, args):
-    if args.minutes is not None:
-        return session.seconds >= 60 * args.minutes
+    if args.minutes or args.steps:
+        return share(session, args) >= 1
     return session.stale >= STALE or session.epochs > EPOCHS
 
 
@@ -63,11 +71,11 @@ def train(session, args):
     start = time.perf_counter() - session.seconds
     saved = judged = session.seconds
     while not over(session, args):
-        if args.minutes is not None:
-            session.cooled(session.seconds / 60 / args.minutes)
+        if args.minutes or args.steps:
+            session.cooled(share(session, args))
         session.step()
         session.seconds = time.perf_counter() - start
-        if session.seconds - judged > JUDGED if args.minutes else not session.order:
+        if session.seconds - judged > JUDGED if args.minutes or args.steps else not session.order:
             say(session, session.validate())
             files(session, args)
             judged = session.seconds

@@ -106,7 +106,7 @@ fn sources(args: &Examples) -> Result<Vec<Source>> {
     }
     for path in &args.volume {
         let volume = args.raw.open(path)?;
-        let name = Path::new(path).file_name().map_or_else(|| shown_path(path), |name| shown_path(&name));
+        let name = Path::new(path).file_name().map_or_else(|| shown_path(path), shown_path);
         sources.push(Source::Given(Arc::new(Scan::new(&name, &volume))));
     }
     if sources.is_empty() {

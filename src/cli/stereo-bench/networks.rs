@@ -30,7 +30,7 @@ pub fn bars(cli: &Cli, software: bool, rows: &mut Rows) -> Result<()> {
     if !software {
         nets.push(("the published shape, random weights", random(Shape::PUBLISHED)?, 60.0));
     }
-    let volume = cao_formats::open(&format!("builtin:engine:{edge}"))?;
+    let volume = cao_formats::open(format!("builtin:engine:{edge}"))?;
     let transfer = TransferFunction::preset("auto", volume.range())?;
     for (what, network, most_ms) in nets {
         // A device of its own, whose memory nothing else takes.

@@ -26,7 +26,7 @@ const MEAN_RAYS: RaySet = RaySet::Spiral(50);
 const END_RAYS: u32 = 64;
 /// Of the reference that labels are compared with: as many as make its own error small beside theirs.
 const CHECK: reference::Plan =
-    reference::Plan { max_voxels: 2000, directions: 1000, steps_per_voxel: 4, ..reference::Plan::FULL };
+    reference::Plan { max_voxels: 1000, directions: 512, steps_per_voxel: 4, ..reference::Plan::FULL };
 
 /// Length of the rays in voxels, of a cube of this edge.
 pub fn radius(edge: usize) -> f64 {
@@ -49,7 +49,10 @@ impl<'a> Labels<'a> {
         let opacity = vec![[0.0, 0.0], [65535.0, 1.0]];
         let transfer = TransferFunction::new(opacity, vec![[0.0, 1.0, 1.0, 1.0]], Some(1.0))?;
         let setup = Setup::of(Method::Rays, 1.0);
-        let occlusion = Occlusion { rays: MEAN_RAYS, radius_mm: radius(edge) as f32, ..setup.occlusion };
+        // Whole steps up to the radius itself.
+        let radius_mm = radius(edge) as f32;
+        let step_mm = Some(radius_mm / radius_mm.round());
+        let occlusion = Occlusion { rays: MEAN_RAYS, radius_mm, step_mm, ..setup.occlusion };
         let setup = Setup { occlusion, scope: Scope::All, ..setup };
         let empty = volume(&grid, vec![0; grid.len()])?;
         let renderer = Renderer::new(gpu, &empty, transfer, setup, COLOUR)?;

@@ -95,7 +95,7 @@ impl<'a> Maker<'a> {
         let mut errors = Vec::new();
         for &label in &self.plan.labels {
             let found = self.labels.of(label, &opacity)?;
-            if i % CHECKED == 0 {
+            if i.is_multiple_of(CHECKED) {
                 errors.push(self.labels.check(label, &opacity, &found)?);
             }
             labels.push(found.into_iter().map(coded).collect::<Vec<u16>>());
