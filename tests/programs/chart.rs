@@ -7,7 +7,7 @@ use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{
     Chart, Plan, Scene, csv, deep, draw, features, foresee, looks_draw, measure, paper, report,
 };
-use cao_measure::contender::{BASELINE, Change, State};
+use cao_measure::contender::{self, Arena, Asked, BASELINE, Change, State};
 use cao_measure::reference;
 use cao_model::builtin::builtin;
 use cao_model::methods::Method;
@@ -222,6 +222,26 @@ fn table_3_of_a_network_has_its_rows_beside_the_printed() {
     for printed in ["0.81", "7e-3", "1322", "0.96", "8e-5", "417", "rays, 190", "Fig. 8, engine"] {
         assert!(page.contains(printed), "{printed}");
     }
+}
+
+/// A grid of 22 · 11.085 / 0.5 voxels along each axis: what leaves a method out of a chart is a refusal and no failure.
+#[test]
+fn a_radius_that_needs_too_fine_a_grid_is_refused_by_name() {
+    let gpu = open();
+    let mut scene = scene("engine", 22);
+    scene.state.radius_mm = 0.5;
+    let asked = Asked { min_spacing: 1.0, radius: 0.5, quick: false };
+    let net = contender::all(&asked).into_iter().find(|e| e.method == "DVAO").unwrap();
+    let views = scene.rig.views(1.0, 1.0, 500.0).unwrap();
+    let arena = Arena { gpu: &gpu, volume: &scene.volume, views: &views, size: [8; 2] };
+    match (net.open)(arena, &scene.state) {
+        Err(cao_measure::Error::Cao(cao::Error::Model(error @ cao_model::Error::Config { .. }))) => {
+            assert!(error.to_string().contains("radius"), "{error}");
+        }
+        Err(other) => panic!("not a refusal: {other}"),
+        Ok(_) => panic!("it was not refused"),
+    }
+    close(gpu);
 }
 
 /// Known by hand: one voxel in a row of bricks.

@@ -4,9 +4,9 @@
 
 use cao_model::network::Shape;
 
-/// A voxel of the grid in samples of rays, with the net that is shipped: 300 on a software driver, and for edges that are rounded up to multiples of 32
+/// A voxel of the grid in samples of rays, with the net that is shipped: 500 on a software driver, and for edges that are rounded up to multiples of 32
 /// half as much again.
-const VOXEL: f64 = 450.0;
+const VOXEL: f64 = 750.0;
 
 /// Cost in rays cast from every voxel, of R voxels each: (radius of the net / R)³ voxels of the grid for one of the volume.
 pub fn ray(radius: f64) -> f64 {

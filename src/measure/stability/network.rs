@@ -74,7 +74,7 @@ impl Plan {
 }
 
 /// Phantoms; `tools/train` trains on all but the last.
-const KINDS: [&str; 5] = ["engine", "fruit", "skeleton", "beetle", "bucky"];
+pub const KINDS: [&str; 5] = ["engine", "fruit", "skeleton", "beetle", "bucky"];
 /// Radii of balls in voxels, and their opacity.
 const BALLS: [f32; 2] = [2.0, 6.0];
 const OPACITY: f32 = 0.5;
