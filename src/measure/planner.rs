@@ -109,7 +109,7 @@ pub fn candidates(
     let chosen = |entry: &&Entry| match method {
         Some(only) => entry.method == only,
         // What one feature takes from another's light is no error of theirs, histograms know no clip, and a network takes longer than rays that
-        // err a tenth as much (`cao chart --dvao`) and errs more on what it was not trained on: such values are for who asks for them.
+        // err a quarter as much (`cao chart --dvao`) and errs more on what it was not trained on: such values are for who asks for them.
         None if [Method::FeatureDriven, Method::Histograms, Method::Deep].contains(&entry.method) => {
             setup.method == entry.method
         }
