@@ -17,7 +17,7 @@
 //! | [`model`] | plain data, another crate: volumes, transfer functions, clips, views, settings, [`METHODS`]. Files come by `cao-formats` |
 //! | [`gpu`] | Vulkan and nothing else, another crate: device (our own, or a host's), memory, pipelines, visible barriers, timestamps |
 //! | [`field`] [`clip`] [`draw`] | the host side of kernels: the volume and its bricks; clips; eyes and pictures |
-//! | [`cast`] [`rays`] [`features`] [`spao`] [`cones`] [`tables`] [`vicinity`] [`histograms`] | the methods, a room each: kernels' host sides, and what there is to do after a change; [`pyramid`]: what two of them share |
+//! | [`cast`] [`rays`] [`features`] [`spao`] [`cones`] [`tables`] [`vicinity`] [`histograms`] [`network`] | the methods, a room each: kernels' host sides, and what there is to do after a change; [`pyramid`]: what two of them share |
 //! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
 //! | [`by_brick`] | what methods have in common that compute brick by brick from V_o alone |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
