@@ -6,8 +6,8 @@
 //           the same voxel are summed beforehand, which leaves 8, others for each of the 8 voxels
 // `last`    as `plain` to one output, whose sigmoid is the net's
 //
-// Of the others' sums Mish is stored, which is what everything after takes. A workgroup takes the outputs of a block for 8 x 4 x 8 voxels, an
-// invocation four of these voxels, on top of each other, so that what is read of weights and of tensors serves several sums.
+// Of the others' sums Mish is stored, which is what everything after takes. A workgroup takes the outputs of a block for 8 x 8 x 8 voxels, an
+// invocation eight of these voxels, on top of each other, so that what is read of weights and of tensors serves several sums.
 
 struct Conv3Params {
     // grid of what goes in
@@ -66,12 +66,20 @@ struct Sums {
     c_high: vec4<f32>,
     d_low: vec4<f32>,
     d_high: vec4<f32>,
+    e_low: vec4<f32>,
+    e_high: vec4<f32>,
+    f_low: vec4<f32>,
+    f_high: vec4<f32>,
+    g_low: vec4<f32>,
+    g_high: vec4<f32>,
+    h_low: vec4<f32>,
+    h_high: vec4<f32>,
 }
 
-const NOTHING = Sums(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+const NOTHING = Sums(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
 
 // An input of all voxels, by its weights.
-fn with_input(sums: Sums, w: u32, x: vec4<f32>) -> Sums {
+fn with_input(sums: Sums, w: u32, x: vec4<f32>, y: vec4<f32>) -> Sums {
     let both = unpacked(weights.all[w]);
     let low = both.low;
     let high = both.high;
@@ -84,19 +92,27 @@ fn with_input(sums: Sums, w: u32, x: vec4<f32>) -> Sums {
         sums.c_high + x.z * high,
         sums.d_low + x.w * low,
         sums.d_high + x.w * high,
+        sums.e_low + y.x * low,
+        sums.e_high + y.x * high,
+        sums.f_low + y.y * low,
+        sums.f_high + y.y * high,
+        sums.g_low + y.z * low,
+        sums.g_high + y.z * high,
+        sums.h_low + y.w * low,
+        sums.h_high + y.w * high,
     );
 }
 
 // All inputs of a block of all voxels, by the weights of one voxel of the kernel.
-fn with_voxel(start: Sums, w: u32, a: Eight, b: Eight, c: Eight, d: Eight) -> Sums {
-    var sums = with_input(start, w, vec4(a.low.x, b.low.x, c.low.x, d.low.x));
-    sums = with_input(sums, w + 1u, vec4(a.low.y, b.low.y, c.low.y, d.low.y));
-    sums = with_input(sums, w + 2u, vec4(a.low.z, b.low.z, c.low.z, d.low.z));
-    sums = with_input(sums, w + 3u, vec4(a.low.w, b.low.w, c.low.w, d.low.w));
-    sums = with_input(sums, w + 4u, vec4(a.high.x, b.high.x, c.high.x, d.high.x));
-    sums = with_input(sums, w + 5u, vec4(a.high.y, b.high.y, c.high.y, d.high.y));
-    sums = with_input(sums, w + 6u, vec4(a.high.z, b.high.z, c.high.z, d.high.z));
-    return with_input(sums, w + 7u, vec4(a.high.w, b.high.w, c.high.w, d.high.w));
+fn with_voxel(start: Sums, w: u32, a: Eight, b: Eight, c: Eight, d: Eight, e: Eight, f: Eight, g: Eight, h: Eight) -> Sums {
+    var sums = with_input(start, w, vec4(a.low.x, b.low.x, c.low.x, d.low.x), vec4(e.low.x, f.low.x, g.low.x, h.low.x));
+    sums = with_input(sums, w + 1u, vec4(a.low.y, b.low.y, c.low.y, d.low.y), vec4(e.low.y, f.low.y, g.low.y, h.low.y));
+    sums = with_input(sums, w + 2u, vec4(a.low.z, b.low.z, c.low.z, d.low.z), vec4(e.low.z, f.low.z, g.low.z, h.low.z));
+    sums = with_input(sums, w + 3u, vec4(a.low.w, b.low.w, c.low.w, d.low.w), vec4(e.low.w, f.low.w, g.low.w, h.low.w));
+    sums = with_input(sums, w + 4u, vec4(a.high.x, b.high.x, c.high.x, d.high.x), vec4(e.high.x, f.high.x, g.high.x, h.high.x));
+    sums = with_input(sums, w + 5u, vec4(a.high.y, b.high.y, c.high.y, d.high.y), vec4(e.high.y, f.high.y, g.high.y, h.high.y));
+    sums = with_input(sums, w + 6u, vec4(a.high.z, b.high.z, c.high.z, d.high.z), vec4(e.high.z, f.high.z, g.high.z, h.high.z));
+    return with_input(sums, w + 7u, vec4(a.high.w, b.high.w, c.high.w, d.high.w), vec4(e.high.w, f.high.w, g.high.w, h.high.w));
 }
 
 // Takes an input block into workgroup memory, behind a barrier.
@@ -129,9 +145,13 @@ fn store(place: vec3<u32>, dims: vec3<u32>, block: u32, low: vec4<f32>, high: ve
 // Those of all voxels, so many apart.
 fn store_all(place: vec3<u32>, apart: u32, dims: vec3<u32>, block: u32, sums: Sums) {
     store(place, dims, block, sums.a_low, sums.a_high);
-    store(place + vec3(0u, 0u, apart), dims, block, sums.b_low, sums.b_high);
+    store(place + vec3(0u, 0u, 1u * apart), dims, block, sums.b_low, sums.b_high);
     store(place + vec3(0u, 0u, 2u * apart), dims, block, sums.c_low, sums.c_high);
     store(place + vec3(0u, 0u, 3u * apart), dims, block, sums.d_low, sums.d_high);
+    store(place + vec3(0u, 0u, 4u * apart), dims, block, sums.e_low, sums.e_high);
+    store(place + vec3(0u, 0u, 5u * apart), dims, block, sums.f_low, sums.f_high);
+    store(place + vec3(0u, 0u, 6u * apart), dims, block, sums.g_low, sums.g_high);
+    store(place + vec3(0u, 0u, 7u * apart), dims, block, sums.h_low, sums.h_high);
 }
 
 @compute @workgroup_size(TEAM)
@@ -148,11 +168,15 @@ fn plain(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         let w = (out_block * params.blocks + block) * 27u * ENTRIES;
         for (var k = 0u; k < 27u; k++) {
             let at = (here.z + k / 9u) * PLANE + (here.y + k / 3u % 3u) * ROW + here.x + k % 3u;
-            let x0 = unpacked(tile[at]);
-            let x1 = unpacked(tile[at + PLANE]);
+            let x0 = unpacked(tile[at + 0u * PLANE]);
+            let x1 = unpacked(tile[at + 1u * PLANE]);
             let x2 = unpacked(tile[at + 2u * PLANE]);
             let x3 = unpacked(tile[at + 3u * PLANE]);
-            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3);
+            let x4 = unpacked(tile[at + 4u * PLANE]);
+            let x5 = unpacked(tile[at + 5u * PLANE]);
+            let x6 = unpacked(tile[at + 6u * PLANE]);
+            let x7 = unpacked(tile[at + 7u * PLANE]);
+            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3, x4, x5, x6, x7);
         }
     }
     store_all(corner + here, 1u, params.dims, out_block, sums);
@@ -176,11 +200,15 @@ fn doubled(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
         let w = ((out_block * params.blocks + block) * 8u + child) * 8u * ENTRIES;
         for (var k = 0u; k < 8u; k++) {
             let at = (first.z + k / 4u) * PLANE + (first.y + k / 2u % 2u) * ROW + first.x + k % 2u;
-            let x0 = unpacked(tile[at]);
-            let x1 = unpacked(tile[at + PLANE]);
+            let x0 = unpacked(tile[at + 0u * PLANE]);
+            let x1 = unpacked(tile[at + 1u * PLANE]);
             let x2 = unpacked(tile[at + 2u * PLANE]);
             let x3 = unpacked(tile[at + 3u * PLANE]);
-            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3);
+            let x4 = unpacked(tile[at + 4u * PLANE]);
+            let x5 = unpacked(tile[at + 5u * PLANE]);
+            let x6 = unpacked(tile[at + 6u * PLANE]);
+            let x7 = unpacked(tile[at + 7u * PLANE]);
+            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3, x4, x5, x6, x7);
         }
     }
     let fine = 2u * (corner + here) + which;
@@ -205,8 +233,10 @@ fn first(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     let w = out_block * 27u;
     for (var k = 0u; k < 27u; k++) {
         let at = here + vec3(k % 3u, k / 3u % 3u, k / 9u) - 1u;
-        let x = vec4(met(at), met(at + vec3(0u, 0u, 1u)), met(at + vec3(0u, 0u, 2u)), met(at + vec3(0u, 0u, 3u)));
-        sums = with_input(sums, w + k, x);
+        let up = vec3(0u, 0u, 1u);
+        let x = vec4(met(at), met(at + up), met(at + 2u * up), met(at + 3u * up));
+        let y = vec4(met(at + 4u * up), met(at + 5u * up), met(at + 6u * up), met(at + 7u * up));
+        sums = with_input(sums, w + k, x, y);
     }
     store_all(here, 1u, params.dims, out_block, sums);
 }
@@ -232,6 +262,7 @@ fn last(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let corner = corner_of(params.base + group.x);
     let here = place_of(lane);
     var sums = vec4(0.0);
+    var above = vec4(0.0);
     for (var block = 0u; block < params.blocks; block++) {
         workgroupBarrier();
         load_block(block, corner, lane);
@@ -239,15 +270,24 @@ fn last(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let w = block * 27u;
         for (var k = 0u; k < 27u; k++) {
             let at = (here.z + k / 9u) * PLANE + (here.y + k / 3u % 3u) * ROW + here.x + k % 3u;
-            let x0 = unpacked(tile[at]);
-            let x1 = unpacked(tile[at + PLANE]);
+            let x0 = unpacked(tile[at + 0u * PLANE]);
+            let x1 = unpacked(tile[at + 1u * PLANE]);
             let x2 = unpacked(tile[at + 2u * PLANE]);
             let x3 = unpacked(tile[at + 3u * PLANE]);
+            let x4 = unpacked(tile[at + 4u * PLANE]);
+            let x5 = unpacked(tile[at + 5u * PLANE]);
+            let x6 = unpacked(tile[at + 6u * PLANE]);
+            let x7 = unpacked(tile[at + 7u * PLANE]);
             sums = with_eight(sums, w + k, x0, x1, x2, x3);
+            above = with_eight(above, w + k, x4, x5, x6, x7);
         }
     }
     give(corner + here, sums.x);
     give(corner + here + vec3(0u, 0u, 1u), sums.y);
     give(corner + here + vec3(0u, 0u, 2u), sums.z);
     give(corner + here + vec3(0u, 0u, 3u), sums.w);
+    give(corner + here + vec3(0u, 0u, 4u), above.x);
+    give(corner + here + vec3(0u, 0u, 5u), above.y);
+    give(corner + here + vec3(0u, 0u, 6u), above.z);
+    give(corner + here + vec3(0u, 0u, 7u), above.w);
 }

@@ -1,5 +1,5 @@
 // A block of channels around a workgroup's voxels, normalised, in workgroup memory. Needs `params.dims`, the grid, and the binding `norms`. A
-// workgroup has TEAM invocations and TILE voxels, of which each takes four, one above the other.
+// workgroup has TEAM invocations and TILE voxels, of which each takes eight, one above the other.
 
 #include "shared/tensors.wgsl"
 
@@ -7,7 +7,7 @@
 
 // Voxels of a workgroup along x, y, z.
 const TILE_X = 8u;
-const TILE_Y = 4u;
+const TILE_Y = 8u;
 const TILE_Z = 8u;
 // Invocations of a workgroup.
 const TEAM = 64u;
@@ -37,5 +37,5 @@ fn corner_of(item: u32) -> vec3<u32> {
 
 // The lowest of an invocation's voxels, in its tile.
 fn place_of(lane: u32) -> vec3<u32> {
-    return vec3(lane % TILE_X, lane / TILE_X % TILE_Y, 4u * (lane / (TILE_X * TILE_Y)));
+    return vec3(lane % TILE_X, lane / TILE_X % TILE_Y, 0u);
 }

@@ -17,8 +17,8 @@ use cao_kernels::shared::bricks::GROUPS_PER_ROW;
 use cao_model::network::Network;
 use std::ops::Range;
 
-/// Floating-point operations of a piece on a software driver: some 20 ms of two cores.
-const SLICE: f64 = 2e8;
+/// Floating-point operations of a piece on a software driver: some 60 ms of two cores.
+const SLICE: f64 = 5e8;
 /// Operations for which a read and a write of a voxel of a tensor stands.
 const TOUCHED: f64 = 200.0;
 
