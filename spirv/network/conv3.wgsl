@@ -115,24 +115,46 @@ fn with_voxel(start: Sums, w: u32, a: Eight, b: Eight, c: Eight, d: Eight, e: Ei
     return with_input(sums, w + 7u, vec4(a.high.w, b.high.w, c.high.w, d.high.w), vec4(e.high.w, f.high.w, g.high.w, h.high.w));
 }
 
-// Takes an input block into workgroup memory, behind a barrier.
-fn load_block(block: u32, corner: vec3<u32>, lane: u32) {
-    let voxels = params.dims.x * params.dims.y * params.dims.z;
+// Where an input block is, and its mean and deviation.
+struct Source {
+    first: bool,
+    begin: u32,
+    norm: Norm,
+}
+
+fn source_of(block: u32) -> Source {
     let first = block < params.first_blocks;
     let of_tensor = select(block - params.first_blocks, block, first);
     let norm = norms.all[select(params.norm_beside, params.norm, first) + of_tensor];
+    return Source(first, of_tensor * params.dims.x * params.dims.y * params.dims.z, norm);
+}
+
+// A voxel of it, normalised; 0 outside the grid. Below the border it is a large number.
+fn voxel_of(block: Source, place: vec3<u32>) -> vec4<u32> {
+    if any(place >= params.dims) {
+        return vec4(0u);
+    }
+    let at = block.begin + voxel_at(place, params.dims);
+    if block.first {
+        return normalised(source.all[at], block.norm);
+    }
+    return normalised(beside.all[at], block.norm);
+}
+
+// Takes an input block into workgroup memory, behind a barrier.
+fn load_block(number: u32, corner: vec3<u32>, lane: u32) {
+    let block = source_of(number);
     for (var i = lane; i < HELD; i += TEAM) {
-        let place = held(corner, i);
-        var here = vec4(0u);
-        if all(place < params.dims) {
-            let at = of_tensor * voxels + voxel_at(place, params.dims);
-            if first {
-                here = normalised(source.all[at], norm);
-            } else {
-                here = normalised(beside.all[at], norm);
-            }
-        }
-        tile[i] = here;
+        tile[i] = voxel_of(block, corner + held(i) - 1u);
+    }
+}
+
+// The part of it that one of the 2³ voxels needs.
+fn load_part(number: u32, corner: vec3<u32>, which: vec3<u32>, lane: u32) {
+    let block = source_of(number);
+    for (var i = lane; i < PART; i += TEAM) {
+        let at = which + vec3(i % PART_X, i / PART_X % PART_Y, i / (PART_X * PART_Y));
+        tile[at.z * PLANE + at.y * ROW + at.x] = voxel_of(block, corner + at - 1u);
     }
 }
 
@@ -195,7 +217,7 @@ fn doubled(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
     var sums = NOTHING;
     for (var block = 0u; block < params.blocks; block++) {
         workgroupBarrier();
-        load_block(block, corner, lane);
+        load_part(block, corner, which, lane);
         workgroupBarrier();
         let w = ((out_block * params.blocks + block) * 8u + child) * 8u * ENTRIES;
         for (var k = 0u; k < 8u; k++) {

@@ -15,12 +15,16 @@ const TEAM = 64u;
 const ROW = TILE_X + 2u;
 const PLANE = ROW * (TILE_Y + 2u);
 const HELD = PLANE * (TILE_Z + 2u);
+// With a voxel on one side only.
+const PART_X = TILE_X + 1u;
+const PART_Y = TILE_Y + 1u;
+const PART = PART_X * PART_Y * (TILE_Z + 1u);
 
 var<workgroup> tile: array<vec4<u32>, HELD>;
 
-// The place in the grid of entry i of a tile; below the border it is a large number.
-fn held(corner: vec3<u32>, i: u32) -> vec3<u32> {
-    return corner + vec3(i % ROW, i / ROW % (TILE_Y + 2u), i / PLANE) - 1u;
+// Where in a tile its entry i is.
+fn held(i: u32) -> vec3<u32> {
+    return vec3(i % ROW, i / ROW % (TILE_Y + 2u), i / PLANE);
 }
 
 // The channels of a voxel, normalised.
