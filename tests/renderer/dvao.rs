@@ -98,6 +98,19 @@ fn tiles_give_every_voxel_its_value_in_its_place() {
     close(gpu);
 }
 
+/// Of cubes of two voxels nothing can be left out for overlap.
+#[test]
+fn the_smallest_cubes_give_every_voxel_its_value() {
+    let gpu = open();
+    let shape = Shape { edge: 2, filters: 1, cap: 1, levels: 1, label: Label::Mean };
+    let zeros = Network::new(shape, vec![0; shape.weights()].into()).unwrap();
+    let grid = Grid { dims: [5, 3, 4], spacing: [1.0; 3] };
+    let renderer = rendered(&gpu, &grid, &[0.5; 60], &zeros, setup(shape.radius(), true));
+    assert!(renderer.read_ambient().unwrap().iter().all(|value| (value - 0.5).abs() < 1e-4));
+    drop(renderer);
+    close(gpu);
+}
+
 #[test]
 fn another_network_is_another_volume_and_what_has_no_grid_is_refused() {
     let gpu = open();

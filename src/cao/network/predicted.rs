@@ -68,7 +68,8 @@ impl Placement {
 
     /// By cubes as it was trained on, of each of which the values are taken whose rays end in it.
     fn tiles(shape: &Shape, count: [u32; 3], voxel: [f32; 3]) -> Self {
-        let (edge, overlap) = (shape.edge, shape.radius().ceil() as u32);
+        // Of the smallest cubes something has to be left.
+        let (edge, overlap) = (shape.edge, (shape.radius().ceil() as u32).min((shape.edge - 1) / 2));
         let step = edge - 2 * overlap;
         // Along an axis: where each begins, and which of its voxels are taken.
         let along = |count: u32| -> Vec<[u32; 3]> {
