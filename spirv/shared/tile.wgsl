@@ -2,7 +2,6 @@
 // workgroup has TEAM invocations and TILE voxels, of which each takes eight, one above the other.
 
 #include "shared/tensors.wgsl"
-
 #include "shared/norms.wgsl"
 
 // Voxels of a workgroup along x, y, z.

@@ -9,6 +9,7 @@ pub mod networks;
 pub mod scan;
 pub mod wgsl;
 
+pub use cao_model::network::half as half_float;
 pub use networks::{Reference, network, network_bytes, network_references};
 
 use cao::field::Field;
@@ -258,14 +259,6 @@ pub fn random_clip(random: &mut Random, shape: &Shape, size: Vec3) -> Clip {
 /// Edges of a volume in mm.
 pub fn size_mm(grid: &Grid) -> Vec3 {
     Vec3::from_array(std::array::from_fn(|i| (grid.dims[i] as f64 * grid.spacing[i]) as f32))
-}
-
-/// Value of a binary16.
-pub fn half_float(bits: u16) -> f32 {
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023) / 1024.0);
-    let value =
-        if exponent == 0 { fraction * 2f32.powi(-14) } else { (1.0 + fraction) * 2f32.powi(exponent - 15) };
-    if bits >> 15 == 1 { -value } else { value }
 }
 
 /// Both eyes in front of a volume, from `azimuth_deg` about +z.
