@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod builtin;
+pub mod bvh;
 pub mod clip;
 pub mod error;
 pub mod feature;
@@ -21,6 +22,7 @@ pub mod options;
 pub mod order;
 pub mod samples;
 pub mod settings;
+pub mod surface;
 pub mod transfer;
 pub mod values;
 pub mod view;

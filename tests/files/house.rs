@@ -250,6 +250,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/methods.rs", &["error", "light", "occlusion", "options"]),
     ("src/model/settings.rs", &["error", "light", "methods", "occlusion", "options"]),
     ("src/model/clip.rs", &["error", "mesh"]),
+    ("src/model/surface.rs", &["clip", "error"]),
+    ("src/model/bvh.rs", &[]),
     ("src/model/order.rs", &[]),
     ("src/model/network.rs", &["error"]),
     ("src/model/volume.rs", &["error", "order", "transfer", "values"]),
