@@ -4,7 +4,8 @@ use crate::field::Field;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder};
-use cao_kernels::shared::eyes::{self, Eye, Frame, MOST_VIEWS};
+use cao_kernels::shared::eye::{Eye, MOST_VIEWS};
+use cao_kernels::shared::eyes::{self, Frame};
 use cao_model::look::{Look, Occluded};
 use cao_model::samples::MOST_SAMPLES;
 use cao_model::view::View;
@@ -113,7 +114,7 @@ const EYES: u64 = size_of::<[Eye; View::MAX]>() as u64;
 const LIGHT: u64 = size_of::<[f32; 3]>() as u64;
 
 /// Checked eyes as kernels read them.
-fn eyes_of(views: &[View]) -> Result<[Eye; View::MAX]> {
+pub fn eyes_of(views: &[View]) -> Result<[Eye; View::MAX]> {
     check_count(views.len())?;
     let mut eyes = [Eye::zeroed(); View::MAX];
     for (eye, view) in eyes.iter_mut().zip(views) {
