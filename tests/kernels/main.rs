@@ -1,5 +1,6 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
+mod blur;
 mod bounds;
 mod boxes;
 mod brick_distance;
@@ -11,6 +12,7 @@ mod clipping;
 mod clusters;
 mod cone;
 mod conv3;
+mod crytek;
 mod dilate;
 mod examples;
 mod expand;
@@ -19,6 +21,7 @@ mod fdao;
 mod feature_colour;
 mod features;
 mod filter;
+mod hbao;
 mod histogram;
 mod labels;
 mod lao;
@@ -43,3 +46,4 @@ mod ssao;
 mod sums;
 mod tiles;
 mod vicinity;
+mod volumetric;
