@@ -20,6 +20,7 @@ pub mod network;
 pub mod occlusion;
 pub mod options;
 pub mod order;
+pub mod pixel_occlusion;
 pub mod samples;
 pub mod settings;
 pub mod surface;
