@@ -22,6 +22,7 @@ pub mod options;
 pub mod order;
 pub mod pixel_occlusion;
 pub mod samples;
+pub mod scenes;
 pub mod settings;
 pub mod surface;
 pub mod transfer;
