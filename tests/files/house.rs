@@ -252,6 +252,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/clip.rs", &["error", "mesh"]),
     ("src/model/surface.rs", &["clip", "error"]),
     ("src/model/bvh.rs", &[]),
+    ("src/model/pixel_occlusion.rs", &["error"]),
+    ("src/model/scenes/", &["bvh", "clip", "error", "mesh", "surface", "view"]),
     ("src/model/order.rs", &[]),
     ("src/model/network.rs", &["error"]),
     ("src/model/volume.rs", &["error", "order", "transfer", "values"]),
