@@ -52,8 +52,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let down = normalize(eye.along_v.xyz);
     // Towards the eye: down is down.
     let back = cross(down, right);
-    let noise = hash(id.y * params.size.x + id.x);
-    let jitter = f32(hash(noise) >> 8u) / 16777216.0;
+    let noise = scrambled(id.y * params.size.x + id.x);
+    let jitter = f32(scrambled(noise) >> 8u) / 16777216.0;
     let apart = 0xffffffffu / params.directions;
     var sum = 0.0;
     for (var k = 0u; k < params.directions; k++) {

@@ -34,7 +34,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let middle = position_of(eye, params.size, id.xy, here.w) + radius * here.xyz;
     let right = normalize(eye.along_u.xyz);
     let down = normalize(eye.along_v.xyz);
-    let turn = hash(id.y * params.size.x + id.x);
+    let turn = scrambled(id.y * params.size.x + id.x);
     var free = 0.0;
     var whole = 0.0;
     for (var i = 0u; i < params.samples; i++) {

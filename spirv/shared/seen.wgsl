@@ -2,6 +2,7 @@
 // Whoever includes this binds `geometry`.
 
 #include "shared/geometry.wgsl"
+#include "shared/hash.wgsl"
 
 struct Accessibility {
     // one a pixel, in the order of the geometry: 1 = open; 1 where nothing is
@@ -25,11 +26,4 @@ fn depth_at(size: vec2<u32>, view: u32, place: vec2<f32>) -> f32 {
 // The angle of a share of a turn, in 2^32ths, in −π … π.
 fn angle_of(turn: u32) -> f32 {
     return (f32(turn >> 8u) / 16777216.0 - 0.5) * TAU;
-}
-
-// A whole number for each pixel, without a pattern (PCG's output permutation).
-fn hash(value: u32) -> u32 {
-    let state = value * 747796405u + 2891336453u;
-    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    return (word >> 22u) ^ word;
 }

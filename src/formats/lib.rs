@@ -1,4 +1,4 @@
-//! Files in and out: volumes ([`open`]), meshes ([`obj`]), transfer functions ([`transfer`]), scenes ([`scene`]), pictures
+//! Files in and out: volumes ([`open`]), clip meshes ([`obj`]), surfaces ([`surface`]), transfer functions ([`transfer`]), scenes ([`scene`]), pictures
 //! ([`picture`]), weights of networks ([`network`]). One reader a file; what a file says and what it should have said is named in every refusal.
 
 #![forbid(unsafe_code)]
@@ -30,6 +30,7 @@ mod polygon;
 mod raw;
 mod reading;
 pub mod scene;
+pub mod surface;
 mod text;
 mod tiff_stack;
 mod toml_value;

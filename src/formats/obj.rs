@@ -92,17 +92,7 @@ pub fn parse(name: impl Into<String>, text: &str) -> Result<TriangleMesh> {
 /// largest integer overflows in it, a malformed material file panics, half-coloured vertices are refused.
 fn geometry_lines(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    let mut lines = text.lines();
-    while let Some(line) = lines.next() {
-        let mut line = line.to_owned();
-        let mut joined = 0;
-        // A backslash continues a line; in a comment or a name it is only a character.
-        while line.trim_start().starts_with(['v', 'f']) && line.ends_with('\\') {
-            line.pop();
-            line.push_str(lines.next().unwrap_or(""));
-            joined += 1;
-        }
-        let line = line.split('#').next().unwrap_or("");
+    for (line, lines) in statements(text) {
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
@@ -124,7 +114,27 @@ fn geometry_lines(text: &str) -> String {
             }
             _ => {}
         }
-        (0..=joined).for_each(|_| out.push('\n'));
+        (0..lines).for_each(|_| out.push('\n'));
     }
     out
+}
+
+/// The statements of an OBJ file, each with how many lines it takes. Those of geometry are without comments: in a name `#` is a character.
+pub(crate) fn statements(text: &str) -> impl Iterator<Item = (String, usize)> {
+    let mut lines = text.lines();
+    std::iter::from_fn(move || {
+        let mut line = lines.next()?.to_owned();
+        let mut count = 1;
+        if line.trim_start().starts_with(['v', 'f']) {
+            // A backslash continues a line; in a comment or a name it is only a character.
+            while line.ends_with('\\') {
+                line.pop();
+                line.push_str(lines.next().unwrap_or(""));
+                count += 1;
+            }
+            let end = line.find('#').unwrap_or(line.len());
+            line.truncate(end);
+        }
+        Some((line, count))
+    })
 }

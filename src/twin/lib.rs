@@ -14,6 +14,7 @@ pub mod field;
 pub mod histograms;
 pub mod image_space;
 pub mod measure;
+pub mod mesh;
 pub mod network;
 pub mod pyramid;
 pub mod rays;

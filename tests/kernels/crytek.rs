@@ -30,7 +30,7 @@ fn points_are_hidden_as_the_twin_has_it_in_both_eyes() {
             println!("eye {eye}: {:.4} % differ", 100.0 * off);
             assert!(off <= FLIPPED, "eye {eye}: {off}");
             let occluded = expected.iter().filter(|a| **a < 0.5).count();
-            assert!(occluded > 50, "only {occluded} pixels are occluded");
+            assert!(occluded > 30, "only {occluded} pixels are occluded");
             // The other eye's image and another radius are told apart.
             assert!(differing(&found[1 - eye], &expected, ROUNDING) > 4.0 * FLIPPED);
             let other = crytek(shown, &Crytek { radius_mm: 26.0 });

@@ -56,3 +56,35 @@ fn along(shown: &Shown, settings: &Hbao, values: &[f64], [dx, dy]: [i64; 2]) -> 
         sum / weights
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image_space::scenes::tests::shown;
+    use glam::Vec3;
+
+    const SETTINGS: Hbao = Hbao { radius_mm: 16.0, directions: 16, bias_deg: 30.0, falloff: true, reach: 7 };
+
+    #[test]
+    fn filters_keep_constants_and_one_of_them_keeps_edges() {
+        let shown = shown(Vec3::new(1.0, 0.0, 1.0), true, 32);
+        let constant = vec![0.25; shown.len()];
+        for found in [square(&shown, &constant), bilateral(&shown, &SETTINGS, &constant)] {
+            assert!(found.iter().all(|v| (v - 0.25).abs() < 1e-12));
+        }
+        // Floor and wall each of one value: nothing goes from one to the other, whose normals are across.
+        let of: Vec<f64> = (0..shown.len()).map(|i| shown.surface(i).unwrap().0.z.round()).collect();
+        assert!(of.contains(&0.0) && of.contains(&1.0));
+        let kept = |found: &[f64]| found.iter().zip(&of).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(kept(&bilateral(&shown, &SETTINGS, &of)) && !kept(&square(&shown, &of)));
+    }
+
+    #[test]
+    fn what_shows_nothing_is_open() {
+        let nothing =
+            Shown::of(&crate::image_space::scenes::tests::view_from(Vec3::X, 30.0), [5, 4], |_, _| None);
+        for found in [square(&nothing, &[0.5; 20]), bilateral(&nothing, &SETTINGS, &[0.5; 20])] {
+            assert_eq!(found, [1.0; 20]);
+        }
+    }
+}

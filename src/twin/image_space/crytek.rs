@@ -65,29 +65,47 @@ mod tests {
     /// Radius in pixels and the filter's, for views of 100 mm by 64 pixels.
     const BORDER: usize = 13;
 
+    fn over(values: &[f64], of: impl Iterator<Item = (usize, DVec3)>) -> [f64; 3] {
+        let found: Vec<f64> = of.map(|(i, _)| values[i]).collect();
+        assert!(found.len() > 50);
+        let bound = |of: fn(f64, f64) -> f64, from| found.iter().copied().fold(from, of);
+        [bound(f64::min, 1.0), found.iter().sum::<f64>() / found.len() as f64, bound(f64::max, 0.0)]
+    }
+
+    /// Exactly: of two opposite points one is hidden. Seen aslant the deeper of them are more than R behind what the image shows, and open.
     #[test]
-    fn a_flat_wall_is_a_half() {
-        for (from, off) in [(Vec3::Z, 1e-12), (Vec3::new(1.0, 0.3, 0.6), 0.0)] {
-            let shown = shown(from, false, 64);
-            let raw = crytek(&shown, &SETTINGS);
-            let found: Vec<f64> = floor(&shown, BORDER).map(|(i, _)| raw[i]).collect();
-            println!(
-                "{from}: {:?}",
-                found.iter().fold((1.0_f64, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)))
-            );
-            let _ = off;
-        }
+    fn a_flat_wall_is_a_half_and_brighter_aslant() {
+        let frontal = shown(Vec3::Z, false, 64);
+        assert_eq!(over(&crytek(&frontal, &SETTINGS), floor(&frontal, BORDER)), [0.5; 3]);
+        let aslant = shown(Vec3::new(1.0, 0.3, 0.6), false, 64);
+        let [least, mean, _] = over(&crytek(&aslant, &SETTINGS), floor(&aslant, BORDER));
+        assert!(least >= 0.5 && (0.6..0.7).contains(&mean), "{least} {mean}");
     }
 
     #[test]
     fn a_concave_corner_is_darker_and_a_convex_edge_brighter() {
-        let shown = shown(Vec3::new(1.0, 0.2, 1.0), true, 64);
-        let blurred = square(&shown, &crytek(&shown, &SETTINGS));
-        let mean = |near: bool| {
-            let of: Vec<f64> =
-                floor(&shown, BORDER).filter(|(_, p)| (p.x < 4.0) == near).map(|(i, _)| blurred[i]).collect();
-            of.iter().sum::<f64>() / of.len() as f64
-        };
-        println!("{} {}", mean(true), mean(false));
+        let concave = shown(Vec3::new(1.0, 0.2, 1.0), true, 64);
+        let blurred = square(&concave, &crytek(&concave, &SETTINGS));
+        let at =
+            |near: bool| over(&blurred, floor(&concave, BORDER).filter(move |(_, p)| (p.x < 4.0) == near))[1];
+        assert!(at(true) < at(false) - 0.1, "{} {}", at(true), at(false));
+        // The same corner from outside is an edge.
+        let convex = shown(Vec3::new(-1.0, 0.2, -1.0), true, 64);
+        let blurred = square(&convex, &crytek(&convex, &SETTINGS));
+        let near = (0..convex.len()).filter_map(|i| Some((i, convex.surface(i)?.1)));
+        let near = near.filter(|(_, p)| p.x < 4.0 && p.z < 4.0 && p.y.abs() < 25.0);
+        assert!(over(&blurred, near)[1] > at(false) + 0.1);
+    }
+
+    #[test]
+    fn mirrors_are_sixteen_and_points_fill_the_ball() {
+        let mirrors: Vec<DVec3> = (0..16).map(|i| mirror(i % 4, i / 4)).collect();
+        for (i, a) in mirrors.iter().enumerate() {
+            assert!((a.length() - 1.0).abs() < 1e-12 && mirrors[..i].iter().all(|b| a.distance(*b) > 0.3));
+        }
+        assert_eq!(mirror(5, 6), mirror(1, 2));
+        // The mean of |p|³ is ½ where points are in equal volumes.
+        let cubes = (0..PAIRS).map(|i| point(i).length().powi(3)).sum::<f64>();
+        assert!((cubes / f64::from(PAIRS) - 0.5).abs() < 1e-12);
     }
 }
