@@ -48,3 +48,4 @@ mod tiles;
 mod trace;
 mod upsample;
 mod vicinity;
+mod volumes;
