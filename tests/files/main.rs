@@ -19,6 +19,7 @@ mod references;
 mod scene;
 mod shaders;
 mod stacks;
+mod surface;
 mod transfer;
 mod twin_network;
 mod volume_files;

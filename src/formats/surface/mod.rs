@@ -27,7 +27,8 @@ pub fn load(path: &Path) -> Result<Vec<Instance>> {
     let instances = match ending.as_str() {
         "obj" => obj::load(path)?,
         _ => {
-            let problem = "is no mesh that is read; expected .obj, or another format converted to it";
+            let problem =
+                "is no mesh that is read; expected .obj, .gltf or .glb, or another format converted to it";
             return Err(Error::file(path, "name", problem));
         }
     };
