@@ -10,6 +10,7 @@ mod fuzz;
 mod hostile;
 mod house;
 mod mesh;
+mod mesh_keys;
 mod network;
 mod orders;
 mod outputs;

@@ -5,7 +5,10 @@
 
 mod mtl;
 mod obj;
+mod place;
 mod texture;
+
+pub use place::moved;
 
 use std::path::Path;
 
