@@ -29,6 +29,14 @@ fn position_of(eye: Eye, size: vec2<u32>, pixel: vec2<u32>, depth: f32) -> vec3<
     return eye.origin.xyz + depth * direction_through(eye, size, vec2<f32>(pixel) + 0.5);
 }
 
+// How far from where it is computed a place may be, of its distances from eye and origin: some roundings of f32. What is nearer to a surface
+// than this is taken for the surface itself.
+const UNCERTAIN = 1e-5;
+
+fn uncertainty(position: vec3<f32>, depth: f32) -> f32 {
+    return UNCERTAIN * (length(position) + depth);
+}
+
 // Where a world position is in a view's image: the place in pixels, and its view depth in mm; in front of the eye where that is above 0.
 fn place_of(eye: Eye, size: vec2<u32>, position: vec3<f32>) -> vec3<f32> {
     let clip = eye.view_projection * vec4(position, 1.0);

@@ -88,6 +88,18 @@ pub const COMMIT: Stage = Stage::new("commit", Phase::Ambient);
 pub const DISTANCES: Stage = Stage::new("distances", Phase::Draw);
 /// Where a host's scene ends the picture's rays.
 pub const SCENE_DEPTH: Stage = Stage::new("scene depth", Phase::Draw);
+/// What pixels show of surfaces.
+pub const GBUFFER: Stage = Stage::new("gbuffer", Phase::Draw);
+/// Occlusion of pixels by rays.
+pub const TRACE: Stage = Stage::new("trace", Phase::Ambient);
+/// Occlusion of pixels by volumes of triangles.
+pub const GATHER: Stage = Stage::new("gather", Phase::Ambient);
+/// Occlusion of all pixels from that of some.
+pub const UPSAMPLE: Stage = Stage::new("upsample", Phase::Ambient);
+/// Pixels that no other is like.
+pub const FAILED: Stage = Stage::new("failed pixels", Phase::Ambient);
+/// The light of surfaces.
+pub const LIGHT: Stage = Stage::new("light", Phase::Draw);
 /// The picture.
 pub const RAYCAST: Stage = Stage::new("raycast", Phase::Draw);
 /// The picture into a host's attachments.

@@ -13,6 +13,7 @@ pub mod features;
 pub mod field;
 pub mod histograms;
 pub mod measure;
+pub mod mesh;
 pub mod network;
 pub mod pyramid;
 pub mod rays;

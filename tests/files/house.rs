@@ -337,6 +337,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/field/", &["error", "host", "drive"]),
     ("src/cao/clip/", &["error", "host", "stages", "field"]),
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
+    ("src/cao/mesh/", &["error", "host", "stages", "drive", "draw"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
     ("src/cao/build.rs", &["error", "stages", "ambient"]),

@@ -8,6 +8,7 @@ pub mod meshes;
 pub mod networks;
 pub mod scan;
 pub mod wgsl;
+pub mod worlds;
 
 pub use cao_model::network::half as half_float;
 pub use networks::{Reference, network, network_bytes, network_references};

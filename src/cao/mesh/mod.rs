@@ -1,3 +1,9 @@
-//! Surfaces: what pixels show of them, and their ambient occlusion.
+//! Surfaces: what pixels show of them, their ambient occlusion by rays and by volumes, their light.
 
+pub mod gather;
+pub mod gbuffer;
 pub mod geometry;
+pub mod light;
+pub mod surfaces;
+pub mod trace;
+pub mod upsample;

@@ -1,0 +1,6 @@
+// Bits of an integer, mixed (PCG's output permutation).
+fn scrambled(value: u32) -> u32 {
+    let state = value * 747796405u + 2891336453u;
+    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
+    return (word >> 22u) ^ word;
+}

@@ -1,0 +1,46 @@
+//! What each pixel shows of a world: normal, depth, and which triangle where. One ray a pixel and view, all views in one dispatch.
+
+use crate::Result;
+use crate::mesh::geometry::Geometry;
+use crate::mesh::surfaces::Surfaces;
+use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
+use cao_kernels::gbuffer as kernel;
+
+/// The kernel `gbuffer`.
+pub struct Gbuffer {
+    pipeline: Pipeline,
+}
+
+impl Gbuffer {
+    /// Bytes of a hit.
+    pub const HIT: u64 = 8;
+
+    /// Builds the pipeline.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
+    }
+
+    /// Writes the geometry, whose eyes are there, and the hits, [`Self::HIT`] bytes a pixel.
+    pub fn record(
+        &self,
+        rec: &mut Recorder,
+        surfaces: &Surfaces,
+        geometry: &Geometry,
+        hits: &Buffer,
+    ) -> Result<()> {
+        let [width, height] = geometry.size();
+        let params = kernel::GbufferParams { size: [width, height] };
+        let binds = kernel::MainBindings {
+            eyes: &geometry.eyes,
+            tree: &surfaces.tree,
+            triangles: &surfaces.triangles,
+            looks: &surfaces.looks,
+            materials: &surfaces.materials,
+            texels: &surfaces.texels,
+            geometry: &geometry.pixels,
+            hits,
+        };
+        let over = [width, height, geometry.views() as u32];
+        Ok(rec.dispatch_over(&self.pipeline, &binds, bytemuck::bytes_of(&params), over)?)
+    }
+}

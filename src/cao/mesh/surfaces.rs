@@ -1,0 +1,199 @@
+//! A world on the device (`spirv/shared/world.wgsl`): its triangles in a tree, what they look like, their textures.
+//!
+//! 48 bytes a triangle for its corners, 36 for its look, some 24 for the tree; 4 a texel.
+
+use crate::host::device_buffer;
+use crate::{Error, Result};
+use bytemuck::Zeroable;
+use cao_gpu::{Buffer, Gpu};
+use cao_kernels::gbuffer as kernel;
+use cao_model::bvh::{Bounds, Bvh, Node};
+use cao_model::surface::{Triangle, World, bounds_of};
+use glam::Vec3;
+
+/// A world's triangles on the device.
+pub struct Surfaces {
+    /// Bound as `tree`: over the boxes of triangles.
+    pub tree: Buffer,
+    /// Bound as `triangles`.
+    pub triangles: Buffer,
+    /// Bound as `looks`.
+    pub looks: Buffer,
+    /// Bound as `materials`.
+    pub materials: Buffer,
+    /// Bound as `texels`.
+    pub texels: Buffer,
+    /// The triangles as they lie there,
+    pub ordered: Vec<Triangle>,
+    /// and whether their backs are surfaces too.
+    pub two_sided: Vec<bool>,
+    nodes: Vec<Node>,
+}
+
+/// The boxes of what triangles may occlude, in the tree of the triangles.
+pub struct VolumeTree {
+    /// Bound as `tree`.
+    pub tree: Buffer,
+}
+
+impl Surfaces {
+    /// Brings a world to the device. Uses its queue and waits for it.
+    ///
+    /// # Errors
+    /// A world without triangles; a device without memory.
+    pub fn new(gpu: &Gpu, world: &World) -> Result<Self> {
+        if world.triangles.is_empty() {
+            return Err(Error::refused("meshes", "there are none; give at least one"));
+        }
+        let boxes: Vec<Bounds> = world.triangles.iter().map(|t| bounds_of(t.corners)).collect();
+        let bvh = Bvh::new(&boxes);
+        let ordered: Vec<Triangle> = bvh.order.iter().map(|item| world.triangles[*item as usize]).collect();
+        let two_sided: Vec<bool> =
+            ordered.iter().map(|t| world.materials[t.material as usize].two_sided).collect();
+        let mut texels: Vec<u8> = Vec::new();
+        let mut materials = Vec::new();
+        for material in &world.materials {
+            let mut on_device = kernel::SurfaceMaterial {
+                colour: glam::Vec3::from(material.colour).extend(material.alpha).to_array(),
+                cutoff: material.cutoff.unwrap_or_default(),
+                ..kernel::SurfaceMaterial::zeroed()
+            };
+            if let Some(texture) = &material.texture {
+                on_device.texture_at = (texels.len() / 4) as u32;
+                [on_device.width, on_device.height] = texture.size;
+                texels.extend(texture.texels.as_flattened());
+            }
+            materials.push(on_device);
+        }
+        texels.resize(texels.len().max(4), 0);
+        if materials.is_empty() {
+            return Err(Error::refused("meshes", "have no materials"));
+        }
+        let triangles: Vec<_> = ordered.iter().map(|t| on_device(t, world)).collect();
+        let looks: Vec<_> = ordered.iter().map(look_of).collect();
+        Ok(Self {
+            tree: device_buffer(gpu, "tree", bytemuck::cast_slice(&packed(&bvh.nodes)))?,
+            triangles: device_buffer(gpu, "triangles", bytemuck::cast_slice(&triangles))?,
+            looks: device_buffer(gpu, "looks", bytemuck::cast_slice(&looks))?,
+            materials: device_buffer(gpu, "materials", bytemuck::cast_slice(&materials))?,
+            texels: device_buffer(gpu, "texels", &texels)?,
+            ordered,
+            two_sided,
+            nodes: bvh.nodes,
+        })
+    }
+
+    /// The tree of what each triangle may occlude within `delta_mm`. Uses the device's queue and waits for it.
+    ///
+    /// # Errors
+    /// A reach that is no length; a device without memory.
+    pub fn volumes(&self, gpu: &Gpu, delta_mm: f32) -> Result<VolumeTree> {
+        if !(delta_mm.is_finite() && delta_mm > 0.0) {
+            return Err(Error::refused("delta_mm", format!("{delta_mm}; expected a length > 0 mm")));
+        }
+        let boxes: Vec<Bounds> = self
+            .ordered
+            .iter()
+            .zip(&self.two_sided)
+            .map(|(triangle, two_sided)| volume_box(triangle.corners, delta_mm, *two_sided))
+            .collect();
+        // The tree names items by the order of the world; here they lie in the order of its leaves.
+        let in_place = Bvh { nodes: self.nodes.clone(), order: (0..boxes.len() as u32).collect() };
+        let nodes = in_place.refit(&boxes);
+        Ok(VolumeTree { tree: device_buffer(gpu, "tree of volumes", bytemuck::cast_slice(&packed(&nodes)))? })
+    }
+}
+
+/// Corners that stick out of a volume farther than this, in deltas, make it a sliver's (AOV §5.2 clamps at 2, which cuts volumes where
+/// falloff is above 0: a corner of 60° already asks for 2).
+const MOST_MITRE: f32 = 4.0;
+
+/// The inward normals of a triangle's edges, from each corner to the next (AOV eq. 22), and the normal of its face.
+fn edges([a, b, c]: [Vec3; 3]) -> ([Vec3; 3], Vec3) {
+    let face = (b - a).cross(c - a).normalize_or_zero();
+    ([(a, b), (b, c), (c, a)].map(|(from, to)| face.cross(to - from).normalize_or_zero()), face)
+}
+
+/// Whether a volume is cut by its triangle's box: some corner is so sharp that δ on both edges is far away (eq. 28).
+pub fn is_sliver(corners: [Vec3; 3]) -> bool {
+    let (inward, _) = edges(corners);
+    // The sine of half a corner's angle, squared.
+    let sharp = |i: usize| 0.5 * (1.0 + inward[i].dot(inward[(i + 2) % 3]));
+    (0..3).any(|i| sharp(i) < 1.0 / (MOST_MITRE * MOST_MITRE))
+}
+
+/// The box of a triangle's occlusion volume: its prism (eq. 23 to 29), or of a sliver that of its box in its plane.
+pub fn volume_box(corners: [Vec3; 3], delta: f32, two_sided: bool) -> Bounds {
+    let (inward, face) = edges(corners);
+    let mut base = Vec::with_capacity(4);
+    if is_sliver(corners) {
+        let [a, b, c] = corners;
+        let along = [b - a, c - b, a - c].into_iter().fold(Vec3::ZERO, |longest, edge| {
+            if edge.length_squared() > longest.length_squared() { edge } else { longest }
+        });
+        let along = along.normalize_or_zero();
+        let across = face.cross(along);
+        let (low, high) = bounds_of(corners.map(|p| Vec3::new((p - a).dot(along), (p - a).dot(across), 0.0)));
+        for (x, y) in [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)] {
+            let grown = |at: f32, low: f32| if at == low { at - delta } else { at + delta };
+            base.push(a + along * grown(x, low.x) + across * grown(y, low.y));
+        }
+    } else {
+        for (i, corner) in corners.into_iter().enumerate() {
+            let (next, before) = (inward[i], inward[(i + 2) % 3]);
+            base.push(corner - (next + before) * (delta / (1.0 + next.dot(before))));
+        }
+    }
+    let under = if two_sided { -delta } else { 0.0 };
+    let (low, high) = bounds_of(base.iter().flat_map(|p| [*p + face * under, *p + face * delta]));
+    // What the kernel's arithmetic may differ by.
+    let margin = 1e-5 * (low.abs().max(high.abs()) + delta);
+    (low - margin, high + margin)
+}
+
+fn on_device(triangle: &Triangle, world: &World) -> kernel::WorldTriangle {
+    let material = &world.materials[triangle.material as usize];
+    let mut kind = 0;
+    if material.cutoff.is_some() {
+        kind |= kernel::MASKED;
+    }
+    if material.two_sided {
+        kind |= kernel::TWO_SIDED;
+    }
+    if is_sliver(triangle.corners) {
+        kind |= kernel::SLIVER;
+    }
+    let with = |corner: usize, w: f32| triangle.corners[corner].extend(w).to_array();
+    kernel::WorldTriangle {
+        a: with(0, triangle.opacity),
+        b: with(1, triangle.material as f32),
+        c: with(2, kind as f32),
+    }
+}
+
+fn look_of(triangle: &Triangle) -> kernel::Look {
+    let [uv_a, uv_b, uv_c] = triangle.uvs.map(|uv| uv.to_array());
+    let [normal_a, normal_b, normal_c] = triangle.normals.map(octahedron);
+    kernel::Look { uv_a, uv_b, uv_c, normal_a, normal_b, normal_c, pad: Default::default() }
+}
+
+/// A unit vector in two 16-bit numbers (Meyer 2010).
+fn octahedron(normal: Vec3) -> u32 {
+    let n = normal / (normal.x.abs() + normal.y.abs() + normal.z.abs());
+    let fold = |this: f32, other: f32| {
+        let side = if this >= 0.0 { 1.0 } else { -1.0 };
+        if n.z < 0.0 { (1.0 - other.abs()) * side } else { this }
+    };
+    let part = |at: f32| (at.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16;
+    u32::from(part(fold(n.x, n.y))) | u32::from(part(fold(n.y, n.x))) << 16
+}
+
+fn packed(nodes: &[Node]) -> Vec<kernel::TreeNode> {
+    let pack = |node: &Node| kernel::TreeNode {
+        low: node.low.to_array(),
+        skip: node.skip,
+        high: node.high.to_array(),
+        leaf: node.first * 8 + node.count,
+    };
+    nodes.iter().map(pack).collect()
+}

@@ -1,0 +1,146 @@
+//! Worlds of few triangles, and what pixels show of them on the device.
+
+use cao::mesh::gbuffer::Gbuffer;
+use cao::mesh::geometry::Geometry;
+use cao::mesh::surfaces::Surfaces;
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image};
+use cao_model::clip::Pose;
+use cao_model::surface::{Instance, Material, Surface, Texture, World};
+use cao_model::view::{StereoRig, View};
+use glam::{Vec2, Vec3};
+use std::sync::Arc;
+
+/// A parallelogram of 2·n² triangles, counter-clockwise from `u` to `v`.
+pub fn sheet(origin: Vec3, u: Vec3, v: Vec3, n: u32, material: Material) -> Surface {
+    let mut surface = Surface { name: "sheet".into(), materials: vec![material], ..Surface::default() };
+    let at = |i: u32, j: u32| j * (n + 1) + i;
+    for j in 0..=n {
+        for i in 0..=n {
+            let place = Vec2::new(i as f32, j as f32) / n as f32;
+            surface.positions.push(origin + u * place.x + v * place.y);
+            surface.uvs.push(2.0 * place);
+        }
+    }
+    for j in 0..n {
+        for i in 0..n {
+            surface.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            surface.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    surface.material_of = vec![0; surface.triangles.len()];
+    surface
+}
+
+/// A box, its faces outward.
+pub fn cuboid(low: Vec3, high: Vec3) -> Surface {
+    let mut surface =
+        Surface { name: "cuboid".into(), materials: vec![Material::default()], ..Surface::default() };
+    surface.positions = (0..8u32)
+        .map(|i| {
+            Vec3::from_array([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { high[axis] } else { low[axis] }))
+        })
+        .collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    for [a, b, c, d] in faces {
+        surface.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    surface.material_of = vec![0; 12];
+    surface
+}
+
+/// All of them where they are.
+pub fn world_of(surfaces: Vec<Surface>) -> World {
+    let place = |surface| Instance { surface: Arc::new(surface), pose: Pose::default() };
+    World::new(&surfaces.into_iter().map(place).collect::<Vec<_>>()).unwrap()
+}
+
+/// A floor and two walls, a box, a net of two sides with holes, a needle: 70 triangles in a room of 100 mm.
+pub fn corner() -> World {
+    let plain = Material::default;
+    let (x, y, z) = (Vec3::X * 100.0, Vec3::Y * 100.0, Vec3::Z * 60.0);
+    let texels = (0..16).map(|i| [200, 150, 100, if (i / 4 + i % 4) % 2 == 0 { 255 } else { 0 }]).collect();
+    let texture = Arc::new(Texture { name: "net".into(), size: [4, 4], texels });
+    let net = Material { texture: Some(texture), cutoff: Some(0.5), two_sided: true, ..plain() };
+    let needle = Surface {
+        positions: vec![Vec3::new(60.0, 20.0, 5.0), Vec3::new(95.0, 25.0, 8.0), Vec3::new(95.0, 27.0, 8.0)],
+        uvs: Vec::new(),
+        triangles: vec![[0, 1, 2]],
+        material_of: vec![0],
+        ..sheet(Vec3::ZERO, Vec3::X, Vec3::Y, 1, Material { two_sided: true, ..plain() })
+    };
+    world_of(vec![
+        sheet(Vec3::ZERO, x, y, 4, plain()),
+        sheet(Vec3::Y * 100.0, x, z, 2, plain()),
+        sheet(Vec3::ZERO, y, z, 2, plain()),
+        cuboid(Vec3::new(45.0, 55.0, 0.0), Vec3::new(75.0, 85.0, 30.0)),
+        sheet(Vec3::new(15.0, 30.0, 18.0), 0.4 * x, 0.35 * y + 0.2 * z, 1, net),
+        needle,
+    ])
+}
+
+/// Both eyes that look into the corner.
+pub fn corner_eyes(size: [u32; 2]) -> [View; 2] {
+    let rig = StereoRig {
+        position: Vec3::new(150.0, -90.0, 110.0),
+        target: Vec3::new(45.0, 50.0, 12.0),
+        up: Vec3::Z,
+        ipd_mm: 12.0,
+        fov_deg: 40.0,
+        screen_mm: None,
+    };
+    rig.views(size[0] as f32 / size[1] as f32, 1.0, 1000.0).unwrap()
+}
+
+/// A world on the device and what views show of it.
+pub struct Pixels {
+    /// The world.
+    pub surfaces: Surfaces,
+    /// Normals and depths.
+    pub geometry: Geometry,
+    /// Triangles.
+    pub hits: Buffer,
+}
+
+impl Pixels {
+    /// Drawn.
+    pub fn new(gpu: &Gpu, world: &World, views: &[View], size: [u32; 2]) -> Self {
+        let surfaces = Surfaces::new(gpu, world).unwrap();
+        let geometry = Geometry::new(gpu, size, views.len()).unwrap();
+        let bytes = Gbuffer::HIT * geometry.pixels.bytes() / Geometry::BYTES;
+        let hits = gpu.buffer("hits", bytes, BufferUse::Device).unwrap();
+        let gbuffer = Gbuffer::new(gpu).unwrap();
+        super::run(gpu, |rec| {
+            geometry.record_eyes(rec, views).unwrap();
+            gbuffer.record(rec, &surfaces, &geometry, &hits).unwrap();
+            rec.barrier(&[Access::StorageWrite], &[Access::StorageRead]);
+        });
+        Self { surfaces, geometry, hits }
+    }
+
+    /// An f32 a pixel, undefined yet.
+    pub fn values(&self, gpu: &Gpu) -> Buffer {
+        self.geometry.values(gpu, "accessibility").unwrap()
+    }
+}
+
+/// What such a buffer holds.
+pub fn floats(gpu: &Gpu, buffer: &Buffer) -> Vec<f32> {
+    bytemuck::pod_collect_to_vec(&super::read_buffer(gpu, buffer))
+}
+
+/// The numbers of all layers of a flat image of floats.
+pub fn layers(gpu: &Gpu, image: &Image) -> Vec<f32> {
+    let [width, height, _] = image.desc().dims;
+    let bytes = u64::from(width) * u64::from(height) * image.desc().format.bytes();
+    let count = u64::from(image.desc().layers);
+    let back = gpu.buffer("layers read-back", bytes * count, BufferUse::Readback).unwrap();
+    super::run(gpu, |rec| {
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        for layer in 0..count {
+            rec.copy_image_to_buffer(image, layer as u32, [0; 3], [width, height, 1], &back, layer * bytes)
+                .unwrap();
+        }
+        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+    });
+    bytemuck::pod_collect_to_vec(&back.read(0, bytes * count).unwrap())
+}
