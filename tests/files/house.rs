@@ -57,6 +57,7 @@ const CRATES: &[Crate] = &[
             "earcut",
             "flate2",
             "glam",
+            "gltf",
             "hayro-jpeg2000",
             "jpeg-decoder",
             "libc",
@@ -434,12 +435,13 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 17] = [
+const ONLY_IN: [(&str, &[&str]); 18] = [
     ("ash", &["src/gpu/", "src/capi/", "src/wgpu/", "src/xr/"]),
     ("wgpu", &["src/wgpu/"]),
     ("openxr", &["src/xr/"]),
     ("gpu_allocator", &["src/gpu/"]),
     ("tobj", &["src/formats/obj.rs", "src/formats/surface/obj.rs"]),
+    ("gltf", &["src/formats/surface/"]),
     ("earcut", &["src/formats/polygon.rs"]),
     ("tiff", &["src/formats/tiff_stack.rs"]),
     ("sha2", &["src/formats/network.rs"]),

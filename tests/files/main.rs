@@ -7,6 +7,7 @@ mod builtin;
 mod dicom;
 mod features;
 mod fuzz;
+mod gltf;
 mod hostile;
 mod house;
 mod mesh;

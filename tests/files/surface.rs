@@ -14,7 +14,7 @@ use proptest::prelude::*;
 const CASES: u32 = 300;
 
 /// A PNG of these pixels.
-fn png(
+pub fn png(
     size: [u32; 2],
     colour: png::ColorType,
     depth: png::BitDepth,
@@ -34,12 +34,12 @@ fn png(
     file
 }
 
-fn rgba(size: [u32; 2], texels: &[[u8; 4]]) -> Vec<u8> {
+pub fn rgba(size: [u32; 2], texels: &[[u8; 4]]) -> Vec<u8> {
     png(size, png::ColorType::Rgba, png::BitDepth::Eight, &[], texels.as_flattened())
 }
 
 /// A folder with these files.
-fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
+pub fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for (name, bytes) in files {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -48,7 +48,7 @@ fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
 }
 
 /// The refusal of the first of these files.
-fn refusal(files: &[(&str, &[u8])]) -> String {
+pub fn refusal(files: &[(&str, &[u8])]) -> String {
     let folder = folder(files);
     match load(&folder.path().join(files[0].0)) {
         Ok(instances) => {
@@ -313,7 +313,7 @@ fn crc(bytes: &[u8]) -> u32 {
 }
 
 /// Any file is read or refused with its name, and what is read makes a world or says why not.
-fn assert_harmless(path: &Path) -> Result<(), TestCaseError> {
+pub fn assert_harmless(path: &Path) -> Result<(), TestCaseError> {
     let folder = path.parent().unwrap().display().to_string();
     let said = match load(path) {
         Ok(instances) => match World::new(&instances) {
