@@ -36,7 +36,8 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
     override_scene(&mut scene, args, matches)?;
-    let volume = args::open(&scene.volume, args.raw.choices.or(scene.reading), &args.input)?;
+    let volume =
+        args::open(args::volume_of(&scene, &args.input)?, args.raw.choices.or(scene.reading), &args.input)?;
     let (mut volume, turn) = scene.frame.arrange(volume)?;
     let transfer = match &args.settings.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range()),
