@@ -340,7 +340,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/clip/", &["error", "host", "stages", "field"]),
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
     ("src/cao/mesh/", &["error", "host", "stages", "drive", "draw"]),
-    ("src/cao/image_space/", &["error", "mesh"]),
+    (
+        "src/cao/mesh_renderer.rs",
+        &["draw", "drive", "error", "host", "image_space", "mesh", "renderer", "stages"],
+    ),
+    ("src/cao/image_space/", &["error", "mesh", "stages"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
     ("src/cao/build.rs", &["error", "stages", "ambient"]),

@@ -10,6 +10,7 @@
 
 use crate::draw::picture::Picture;
 use crate::drive::add;
+use crate::image_space::method::{ByImage, image_method};
 use crate::mesh::ambient::{ByRays, ByVolumes, PixelAmbient, Pixels};
 use crate::mesh::gbuffer::Gbuffer;
 use crate::mesh::geometry::Geometry;
@@ -48,14 +49,27 @@ impl MeshRenderer {
     /// Settings that the method does not have; a world without triangles; a device without memory.
     pub fn new(gpu: &Gpu, world: &World, occlusion: PixelOcclusion) -> Result<Self> {
         occlusion.check()?;
+        let delta_mm = occlusion.delta_mm(world.bounds());
         let method: Box<dyn PixelAmbient> = match occlusion.method {
+            PixelMethod::Aov => Box::new(ByVolumes::new(gpu, occlusion.sparse)?),
             PixelMethod::Rays => Box::new(ByRays::new(gpu, occlusion.rays)?),
-            _ => Box::new(ByVolumes::new(gpu, occlusion.sparse)?),
+            PixelMethod::Crytek | PixelMethod::Volumetric | PixelMethod::Hbao => {
+                let method = image_method(&occlusion, delta_mm);
+                Box::new(ByImage::new(gpu, method.expect("the three are of images"))?)
+            }
         };
+        Self::with(gpu, world, method, delta_mm)
+    }
+
+    /// With a method of one's own: AOV by volumes that are drawn, say.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(gpu: &Gpu, world: &World, method: Box<dyn PixelAmbient>, delta_mm: f32) -> Result<Self> {
         Ok(Self {
             gpu: gpu.clone(),
             surfaces: Surfaces::new(gpu, world)?,
-            delta_mm: occlusion.delta_mm(world.bounds()),
+            delta_mm,
             method,
             gbuffer: Gbuffer::new(gpu)?,
             light: Light::new(gpu)?,
