@@ -94,8 +94,12 @@ pub const GBUFFER: Stage = Stage::new("gbuffer", Phase::Draw);
 pub const TRACE: Stage = Stage::new("trace", Phase::Ambient);
 /// Occlusion of pixels by volumes of triangles.
 pub const GATHER: Stage = Stage::new("gather", Phase::Ambient);
+/// Occlusion of pixels by volumes of triangles, drawn.
+pub const VOLUMES: Stage = Stage::new("volumes", Phase::Ambient);
 /// Occlusion of all pixels from that of some.
 pub const UPSAMPLE: Stage = Stage::new("upsample", Phase::Ambient);
+/// Occlusion of pixels by what the image shows.
+pub const IMAGE_SPACE: Stage = Stage::new("image space", Phase::Ambient);
 /// Pixels that no other is like.
 pub const FAILED: Stage = Stage::new("failed pixels", Phase::Ambient);
 /// The light of surfaces.

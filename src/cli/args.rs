@@ -296,6 +296,16 @@ impl Raw {
     }
 }
 
+/// The volume of a scene that is to have one.
+pub fn volume_of<'a>(scene: &'a cao_formats::Scene, input: &OsStr) -> Result<&'a VolumeSource> {
+    scene.volume.as_ref().ok_or_else(|| {
+        usage(format!(
+            "{}: a scene of meshes without a volume; expected one with the key volume",
+            shown_path(input)
+        ))
+    })
+}
+
 /// Opens a volume and prints its warnings; errors name `input`, also where the library knows of no file.
 pub fn open(source: &VolumeSource, reading: Reading, input: &OsStr) -> Result<Volume> {
     let opened = match source.open(&reading) {

@@ -1,6 +1,6 @@
 //! The scene file: everything that one picture needs, in TOML.
 //!
-//! Paths are relative to the scene file. Every key but `volume` may be left out. Unknown keys and impossible values are
+//! Paths are relative to the scene file. Every key but `volume` may be left out, and that in a scene of meshes. Unknown keys and impossible values are
 //! refused by name. Lengths are millimetres, angles degrees, colours sRGB. Clips with their meshes, eyes and light share one
 //! frame, whose origin is the volume's centre and whose axes `frame` chooses ([`Frame`]).
 //!
@@ -21,6 +21,8 @@
 //!     translate_mm = [20, 0, 30]
 //!     rotate_deg = [0, 45, 0]          # about the fixed axes x, then y, then z
 //!     scale = 40                       # or one number an axis: [40, 40, 20]
+//!
+//!     ## [[mesh]]                       # meshes that are drawn, and [mesh_occlusion]: module `mesh_keys`
 //!
 //!     ## label = "seg.nrrd"             # parts of the volume, by a label map or by values, and how each is shown: module `feature`
 //!     ## [[feature]]                    # none, or up to eight
@@ -82,11 +84,13 @@ use serde::Deserialize;
 use toml::Value;
 
 use crate::feature::FeatureSettings;
+use crate::keys::{existing, length, pose, vector};
+use crate::mesh_keys::{MOST_MESHES, MeshFile, MeshOcclusionFile, MeshSource};
 use crate::reading::{NoNumbers, Reading};
 use crate::toml_value::{in_line, number, parse_colour, shown};
 use crate::{Error, Result, file, light, obj, transfer};
-use cao_model::clip::{Clip, Mode, Pose, Shape};
-use cao_model::error::{quoted, shown_path};
+use cao_model::clip::{Clip, Mode, Shape};
+use cao_model::error::quoted;
 use cao_model::fit::{Fit, Fitting};
 use cao_model::frame::Frame;
 use cao_model::light::AmbientLight;
@@ -94,6 +98,7 @@ use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::options::Options;
+use cao_model::pixel_occlusion::PixelOcclusion;
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
@@ -102,17 +107,21 @@ use cao_model::view::StereoRig;
 /// Largest edge of one eye's image in pixels: what every Vulkan device with a desktop driver holds.
 pub const MAX_IMAGE: u32 = 16384;
 
-/// Everything that one picture needs. Meshes and transfer functions are loaded, the volume is only named.
+/// Everything that one picture needs. Clip meshes and transfer functions are loaded, the volume and the meshes to draw are only named.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Where the volume comes from.
-    pub volume: VolumeSource,
+    /// Where the volume comes from; `None` in a scene of meshes alone.
+    pub volume: Option<VolumeSource>,
     /// How to read it where the file leaves a choice.
     pub reading: Reading,
     /// What the axes of clips, eyes and light are.
     pub frame: Frame,
     /// Where opacity and colour come from; see [`Scene::transfer`].
     pub transfer: TransferSource,
+    /// Meshes that are drawn; at most [`MOST_MESHES`].
+    pub meshes: Vec<MeshSource>,
+    /// How they are occluded.
+    pub mesh_occlusion: PixelOcclusion,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are solids.
     pub clips: Vec<Clip>,
     /// Parts of the volume; see [`FeatureSettings::features`].
@@ -360,10 +369,12 @@ impl Scene {
     /// The scene of a volume and nothing else, as `cao render VOLUME` draws it.
     pub fn default_for(volume: VolumeSource) -> Self {
         Self {
-            volume,
+            volume: Some(volume),
             reading: Reading::default(),
             frame: Frame::default(),
             transfer: TransferSource::Preset("auto".into()),
+            meshes: Vec::new(),
+            mesh_occlusion: PixelOcclusion::default(),
             clips: Vec::new(),
             features: FeatureSettings::default(),
             occlusion: OcclusionSettings::default(),
@@ -396,10 +407,15 @@ impl Scene {
                 format!("{} clips: expected at most {}", file.clip.len(), Clip::MAX),
             ));
         }
+        file.check_meshes()?;
         let clips = file.clip.into_iter().enumerate();
         let step_mm = file.image.step_mm.map(|mm| mm as f32);
         let (samples, filter) = file.image.samples()?;
-        let (volume, reading) = volume(file.volume, base)?;
+        let (volume, reading) = match file.volume {
+            Some(value) => volume(value, base).map(|(volume, reading)| (Some(volume), reading))?,
+            None => (None, Reading::default()),
+        };
+        let meshes = file.mesh.into_iter().enumerate();
         Ok(Self {
             volume,
             reading,
@@ -407,9 +423,13 @@ impl Scene {
             transfer: file
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
+            meshes: meshes.map(|(i, mesh)| mesh.read(&format!("mesh[{i}]"), base)).collect::<Result<_>>()?,
+            mesh_occlusion: file
+                .mesh_occlusion
+                .map_or(Ok(PixelOcclusion::default()), MeshOcclusionFile::read)?,
             clips: clips.map(|(i, clip)| clip.read(&format!("clip[{i}]"), base)).collect::<Result<_>>()?,
             features: FeatureSettings::from_keys(file.label, file.feature, base)?,
-            occlusion: file.occlusion.read()?,
+            occlusion: file.occlusion.unwrap_or_default().read()?,
             stereo: file.stereo.read()?,
             image: file.image.read()?,
             look: Look { step_mm, samples, filter, ..file.shading.read()? },
@@ -432,22 +452,52 @@ impl Scene {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SceneFile {
-    volume: Value,
+    volume: Option<Value>,
     frame: Option<String>,
     transfer: Option<Value>,
+    #[serde(default)]
+    mesh: Vec<MeshFile>,
+    mesh_occlusion: Option<MeshOcclusionFile>,
     #[serde(default)]
     clip: Vec<ClipFile>,
     label: Option<Value>,
     #[serde(default)]
     feature: Vec<toml::Table>,
-    #[serde(default)]
-    occlusion: OcclusionFile,
+    occlusion: Option<OcclusionFile>,
     #[serde(default)]
     stereo: StereoFile,
     #[serde(default)]
     image: ImageFile,
     #[serde(default)]
     shading: ShadingFile,
+}
+
+impl SceneFile {
+    /// Refuses too many meshes, a scene of nothing, and what has no effect in a scene without a volume or without meshes.
+    fn check_meshes(&self) -> Result<()> {
+        if self.mesh.len() > MOST_MESHES {
+            let problem = format!("{} meshes: expected at most {MOST_MESHES}", self.mesh.len());
+            return Err(Error::refused("mesh", problem));
+        }
+        if self.mesh.is_empty() {
+            return match (&self.volume, &self.mesh_occlusion) {
+                (None, _) => Err(Error::refused("scene", "missing field `volume`; expected it, or [[mesh]]")),
+                (_, Some(_)) => Err(Error::refused("mesh_occlusion", "has no effect without [[mesh]]")),
+                (_, None) => Ok(()),
+            };
+        }
+        let of_volumes = [
+            ("frame", self.frame.is_some()),
+            ("transfer", self.transfer.is_some()),
+            ("label", self.label.is_some()),
+            ("feature", !self.feature.is_empty()),
+            ("occlusion", self.occlusion.is_some()),
+        ];
+        match of_volumes.iter().find(|(_, given)| *given && self.volume.is_none()) {
+            Some((key, _)) => Err(Error::refused(key, "has no effect without volume")),
+            None => Ok(()),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -658,33 +708,7 @@ impl ClipFile {
         };
         let mode = self.mode.as_deref().map_or(Ok(Mode::Remove), Mode::parse);
         let mode = mode.map_err(|error| Error::from(error).renamed(&format!("{key}.mode")))?;
-        let mut pose = Pose::default();
-        // One at a time, so that a refusal is under the key that caused it.
-        let mut checked = |name: &str, set: &dyn Fn(&mut Pose)| {
-            set(&mut pose);
-            pose.check().map_err(|error| Error::from(error).renamed(&format!("{key}.{name}")))
-        };
-        if let Some(mm) = self.translate_mm {
-            checked("translate_mm", &|pose| pose.translate_mm = vector(mm))?;
-        }
-        if let Some(degrees) = self.rotate_deg {
-            checked("rotate_deg", &|pose| pose.rotate_deg = vector(degrees))?;
-        }
-        if let Some(value) = &self.scale {
-            let factors = match value {
-                Value::Array(axes) => axes.iter().map(number).collect::<Option<Vec<f64>>>(),
-                single => number(single).map(|factor| vec![factor; 3]),
-            };
-            let factors: Option<[f64; 3]> = factors.and_then(|axes| axes.try_into().ok());
-            let expected = || {
-                Error::refused(
-                    &format!("{key}.scale"),
-                    format!("{}: expected a number > 0 or three", shown(value)),
-                )
-            };
-            let factors = factors.ok_or_else(expected)?;
-            checked("scale", &|pose| pose.scale = vector(factors))?;
-        }
+        let pose = pose(key, self.translate_mm, self.rotate_deg, self.scale.as_ref())?;
         Ok(Clip { shape, mode, pose })
     }
 }
@@ -908,26 +932,4 @@ impl ShadingFile {
         look.check()?;
         Ok(look)
     }
-}
-
-/// A length in mm that an f32 can hold: > 0, or >= 0 where `zero` may be.
-fn length(key: &str, mm: Option<f64>, zero: bool) -> Result<()> {
-    match mm {
-        Some(mm) if !((mm as f32).is_finite() && mm >= 0.0 && (zero || mm as f32 > 0.0)) => Err(
-            Error::refused(key, format!("{mm}: expected a length {} 0 mm", if zero { ">=" } else { ">" })),
-        ),
-        _ => Ok(()),
-    }
-}
-
-fn existing(key: &str, base: &Path, path: &Path) -> Result<PathBuf> {
-    let path = base.join(path);
-    match path.exists() {
-        true => Ok(path),
-        false => Err(Error::refused(key, format!("there is no file {}", shown_path(&path)))),
-    }
-}
-
-fn vector(of: [f64; 3]) -> Vec3 {
-    Vec3::from_array(of.map(|c| c as f32))
 }

@@ -120,6 +120,15 @@ scale = 2.5
 [[clip]]
 shape = "sphere"
 scale = [1, 2, 3]
+[[mesh]]
+file = "m.obj"
+translate_mm = [1.0, 2, 3]
+scale = 2.5
+colour = "#c8b090"
+[mesh_occlusion]
+method = "aov"
+delta_mm = 12.5
+sparse = 3
 [occlusion]
 method = "rays"
 rays = "spiral:50"
@@ -270,7 +279,7 @@ proptest! {
         if scene {
             match Scene::load(&path) {
                 // A built-in may be asked for in any size: making it is the user's wish.
-                Ok(scene) if matches!(scene.volume, VolumeSource::File(_)) => drop(scene.volume.open(&Reading::default())),
+                Ok(Scene { volume: Some(source @ VolumeSource::File(_)), .. }) => drop(source.open(&Reading::default())),
                 Ok(_) => {}
                 Err(error) => assert_named(&error, &path)?,
             }
@@ -300,6 +309,6 @@ fn seeds_are_read_before_they_are_changed() {
     ];
     let path = put(folder.path(), &seed, SCENE.as_bytes());
     let scene = Scene::load(&path).unwrap();
-    scene.volume.open(&Reading::default()).unwrap();
+    scene.volume.unwrap().open(&Reading::default()).unwrap();
     cao_formats::transfer::load(folder.path().join("t.toml").to_str().unwrap(), (0.0, 1.0)).unwrap();
 }

@@ -57,6 +57,7 @@ const CRATES: &[Crate] = &[
             "earcut",
             "flate2",
             "glam",
+            "gltf",
             "hayro-jpeg2000",
             "jpeg-decoder",
             "libc",
@@ -271,12 +272,26 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/formats/polygon.rs", &[]),
     ("src/formats/network.rs", &["error", "file"]),
     ("src/formats/obj.rs", &["error", "file", "polygon"]),
+    ("src/formats/surface/", &["error", "file", "obj", "polygon"]),
+    ("src/formats/keys.rs", &["error", "toml_value"]),
+    ("src/formats/mesh_keys.rs", &["error", "keys", "surface", "toml_value"]),
     ("src/formats/transfer.rs", &["error", "file", "toml_value"]),
     ("src/formats/light.rs", &["error", "toml_value"]),
     ("src/formats/feature.rs", &["error", "file", "toml_value"]),
     (
         "src/formats/scene.rs",
-        &["error", "feature", "file", "light", "obj", "reading", "toml_value", "transfer"],
+        &[
+            "error",
+            "feature",
+            "file",
+            "keys",
+            "light",
+            "mesh_keys",
+            "obj",
+            "reading",
+            "toml_value",
+            "transfer",
+        ],
     ),
     // The readers of volumes, and what refuses and assembles for all of them.
     ("src/formats/binary.rs", &[]),
@@ -325,7 +340,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/clip/", &["error", "host", "stages", "field"]),
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
     ("src/cao/mesh/", &["error", "host", "stages", "drive", "draw"]),
-    ("src/cao/image_space/", &["error", "draw", "mesh"]),
+    (
+        "src/cao/mesh_renderer.rs",
+        &["draw", "drive", "error", "host", "image_space", "mesh", "renderer", "stages"],
+    ),
+    ("src/cao/image_space/", &["error", "draw", "mesh", "stages"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
     ("src/cao/build.rs", &["error", "stages", "ambient"]),
@@ -422,12 +441,13 @@ const ROOT_NAMES: [(&str, &str, &str); 7] = [
 ];
 
 /// Other crates, and modules of ours, that only some places of the libraries and programs may name.
-const ONLY_IN: [(&str, &[&str]); 17] = [
+const ONLY_IN: [(&str, &[&str]); 18] = [
     ("ash", &["src/gpu/", "src/capi/", "src/wgpu/", "src/xr/"]),
     ("wgpu", &["src/wgpu/"]),
     ("openxr", &["src/xr/"]),
     ("gpu_allocator", &["src/gpu/"]),
-    ("tobj", &["src/formats/obj.rs"]),
+    ("tobj", &["src/formats/obj.rs", "src/formats/surface/obj.rs"]),
+    ("gltf", &["src/formats/surface/"]),
     ("earcut", &["src/formats/polygon.rs"]),
     ("tiff", &["src/formats/tiff_stack.rs"]),
     ("sha2", &["src/formats/network.rs"]),

@@ -24,6 +24,10 @@ fn with(text: &str) -> Scene {
     read(&format!("{ENGINE}{text}")).unwrap()
 }
 
+fn volume(scene: &Scene) -> &VolumeSource {
+    scene.volume.as_ref().unwrap()
+}
+
 fn obj(mesh: &TriangleMesh) -> String {
     let vertices = mesh.vertices.iter().map(|v| format!("v {} {} {}\n", v.x, v.y, v.z));
     let faces = mesh.triangles.iter().map(|t| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1));
@@ -35,7 +39,7 @@ fn a_volume_is_enough() {
     let scene = with("");
     let default = Scene::default_for(VolumeSource::parse("builtin:engine:16"));
     assert_eq!(format!("{scene:?}"), format!("{default:?}"));
-    assert_eq!(scene.volume.open(&scene.reading).unwrap().volume.dims, [16; 3]);
+    assert_eq!(volume(&scene).open(&scene.reading).unwrap().volume.dims, [16; 3]);
     let occlusion = scene.occlusion.setup(0.5).unwrap().occlusion;
     assert_eq!(
         (occlusion.radius_mm, occlusion.rays, occlusion.quadrature),
@@ -167,7 +171,7 @@ fn files_are_found_beside_the_scene() {
     );
     let scene = Scene::load(&dir.path().join("scene.toml")).unwrap();
     assert_eq!(
-        scene.volume,
+        *volume(&scene),
         VolumeSource::Raw {
             path: dir.path().join("values.raw"),
             dims: [2, 1, 1],
@@ -176,9 +180,9 @@ fn files_are_found_beside_the_scene() {
             big_endian: true
         }
     );
-    let volume = scene.volume.open(&scene.reading).unwrap().volume;
-    assert_eq!((volume.at(0, 0, 0), volume.at(1, 0, 0), volume.spacing), (1.0, 2.0, [1.0, 1.0, 2.0]));
-    assert_eq!(scene.transfer(volume.range()).unwrap().opacity_at(0.0), 0.25);
+    let opened = volume(&scene).open(&scene.reading).unwrap().volume;
+    assert_eq!((opened.at(0, 0, 0), opened.at(1, 0, 0), opened.spacing), (1.0, 2.0, [1.0, 1.0, 2.0]));
+    assert_eq!(scene.transfer(opened.range()).unwrap().opacity_at(0.0), 0.25);
     for clip in &scene.clips {
         let Shape::Mesh(mesh) = &clip.shape else { panic!("a mesh") };
         assert!(
@@ -189,12 +193,12 @@ fn files_are_found_beside_the_scene() {
     put("series.toml", "volume = { dicom = \"values.raw\", series = \"2\" }");
     let series = Scene::load(&dir.path().join("series.toml")).unwrap();
     let path = dir.path().join("values.raw");
-    assert_eq!(series.volume, VolumeSource::Series { path, series: "2".into() });
-    let refusal = series.volume.open(&cao_formats::Reading::default()).unwrap_err().to_string();
+    assert_eq!(*volume(&series), VolumeSource::Series { path, series: "2".into() });
+    let refusal = volume(&series).open(&cao_formats::Reading::default()).unwrap_err().to_string();
     assert!(refusal.contains("only DICOM files have series"), "{refusal}");
     put("plain.toml", "volume = \"values.raw\"");
     let plain = Scene::load(&dir.path().join("plain.toml")).unwrap();
-    assert_eq!(plain.volume, VolumeSource::File(dir.path().join("values.raw")));
+    assert_eq!(*volume(&plain), VolumeSource::File(dir.path().join("values.raw")));
 }
 
 #[test]

@@ -52,4 +52,5 @@ mod tiles;
 mod trace;
 mod upsample;
 mod vicinity;
+mod volumes;
 mod volumetric;

@@ -12,5 +12,6 @@ pub mod blur;
 pub mod crytek;
 pub mod first_hit;
 pub mod hbao;
+pub mod method;
 pub mod shade;
 pub mod volumetric;

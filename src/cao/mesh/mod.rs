@@ -1,5 +1,6 @@
 //! Surfaces: what pixels show of them, their ambient occlusion by rays and by volumes, their light.
 
+pub mod ambient;
 pub mod gather;
 pub mod gbuffer;
 pub mod geometry;
@@ -7,3 +8,4 @@ pub mod light;
 pub mod surfaces;
 pub mod trace;
 pub mod upsample;
+pub mod volumes;

@@ -1,7 +1,9 @@
 //! Flags and their meaning, one place for all commands. Those that the programs share are in [`cao_cli::args`].
 
 use anyhow::{Context, Result};
-pub use cao_cli::args::{Global, Parts, Raw, Settings, has_extension, open, setup, shape, transfer, usage};
+pub use cao_cli::args::{
+    Global, Parts, Raw, Settings, has_extension, open, setup, shape, transfer, usage, volume_of,
+};
 use cao_cli::args::{length, methods_help, network, number, positive, size, three, triple};
 use cao_measure::stability::Trial;
 use cao_model::METHODS;

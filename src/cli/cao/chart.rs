@@ -304,7 +304,8 @@ fn scene(args: &Args, name: &OsStr, radius: Option<f32>) -> Result<Scene> {
         true => cao_formats::Scene::load(Path::new(name))?,
         false => cao_formats::Scene::default_for(args.raw.source(name)?),
     };
-    let volume = args::open(&described.volume, args.raw.choices.or(described.reading), name)?;
+    let volume =
+        args::open(args::volume_of(&described, name)?, args.raw.choices.or(described.reading), name)?;
     let (mut volume, turn) = described.frame.arrange(volume)?;
     let transfer = match &args.transfer {
         Some(spec) => cao_formats::transfer::load(spec, volume.range()),

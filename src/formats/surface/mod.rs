@@ -3,9 +3,14 @@
 //! Lengths come out in mm, z up: OBJ is taken as it stands, glTF (metres, y up) is scaled and turned. Memory follows the file: what counts or
 //! sizes claim is compared with what is there, and with limits that are said. Nothing is fetched from a network.
 
+mod gltf;
+mod gltf_data;
 mod mtl;
 mod obj;
+mod place;
 mod texture;
+
+pub use place::moved;
 
 use std::path::Path;
 
@@ -16,7 +21,8 @@ use cao_model::surface::{Instance, Surface};
 /// Longest file of geometry: some five million triangles as text.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// The surfaces of a file, by the ending of its name: `.obj` is one, at the origin.
+/// The surfaces of a file, by the ending of its name: `.obj` is one, at the origin; `.gltf` and `.glb` are the nodes of
+/// the default scene.
 ///
 /// # Errors
 /// [`Error::Io`] for a file that cannot be read; [`Error::File`] naming the file, its part, what was found and what would do, also for the
@@ -26,8 +32,10 @@ pub fn load(path: &Path) -> Result<Vec<Instance>> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     let instances = match ending.as_str() {
         "obj" => obj::load(path)?,
+        "gltf" | "glb" => gltf::load(path)?,
         _ => {
-            let problem = "is no mesh that is read; expected .obj, or another format converted to it";
+            let problem =
+                "is no mesh that is read; expected .obj, .gltf or .glb, or another format converted to it";
             return Err(Error::file(path, "name", problem));
         }
     };

@@ -26,9 +26,10 @@ struct Statements {
     geometry: String,
     /// The faces in their order.
     faces: Vec<Face>,
-    /// Names of libraries, and of materials in the order of their first use; the first is what stands before any `usemtl`.
+    /// Names of libraries.
     libraries: Vec<String>,
-    materials: Vec<(String, usize)>,
+    /// Names of the materials of faces and the lines of their `usemtl`; none before any.
+    materials: Vec<Option<(String, usize)>>,
     /// Whether any corner has a normal, or texture coordinates.
     normals: bool,
     uvs: bool,
@@ -118,10 +119,8 @@ fn materials(path: &Path, said: &Statements, folder: &Path) -> Result<Vec<Materi
         }
     }
     let mut textures = Textures::default();
-    let material = |(name, line): &(String, usize)| {
-        if *line == 0 {
-            return Ok(Material::default());
-        }
+    let material = |used: &Option<(String, usize)>| {
+        let Some((name, line)) = used else { return Ok(Material::default()) };
         match library.material(name, &mut textures)? {
             Some(material) => Ok(material),
             None if said.libraries.is_empty() || !all_there => {
@@ -140,9 +139,9 @@ fn materials(path: &Path, said: &Statements, folder: &Path) -> Result<Vec<Materi
 /// The lines of a file that matter. Every corner gets a normal and texture coordinates, the first of all, which are none, where it has no
 /// others, because the parser wants all or no corners to have them.
 fn statements(path: &Path, text: &str) -> Result<Statements> {
-    let mut said = Statements { materials: vec![("default".into(), 0)], ..Statements::default() };
+    let mut said = Statements::default();
     let mut known = HashMap::new();
-    let mut material = 0;
+    let (mut used, mut material) = (None, None);
     // Positions, texture coordinates, normals so far.
     let mut counts = [0_i64, 1, 1];
     let mut number = 1;
@@ -177,6 +176,13 @@ fn statements(path: &Path, text: &str) -> Result<Statements> {
                 }
                 // One and two corners are points and lines.
                 if corners.len() > 2 {
+                    let material = *material.get_or_insert_with(|| {
+                        let name = used.as_ref().map(|(name, _): &(String, usize)| name.clone());
+                        *known.entry(name).or_insert_with(|| {
+                            said.materials.push(used.clone());
+                            said.materials.len() as u32 - 1
+                        })
+                    });
                     let mut face = Face { line: number, material, uvs: true };
                     out.push('f');
                     for corner in corners {
@@ -195,13 +201,7 @@ fn statements(path: &Path, text: &str) -> Result<Statements> {
                 }
             }
             "mtllib" if !rest.is_empty() => said.libraries.push(rest.to_owned()),
-            "usemtl" => {
-                let next = said.materials.len() as u32;
-                material = *known.entry(rest.to_owned()).or_insert(next);
-                if material == next {
-                    said.materials.push((rest.to_owned(), number));
-                }
-            }
+            "usemtl" => (used, material) = (Some((rest.to_owned(), number)), None),
             _ => {}
         }
         (0..lines).for_each(|_| out.push('\n'));
