@@ -216,6 +216,11 @@ fn wrong_gltf_files_are_refused_with_file_and_part() {
             "{\"bufferView\": 3, \"byteOffset\": 10, \"componentType\": 5121}",
             "accessor 4: puts a sparse value where there is no place",
         ),
+        (
+            "{\"bufferView\": 0, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", \"min\": [0, 0, 0], \"max\": [3, 3, 1],",
+            "{\"componentType\": 5126, \"count\": 99999, \"type\": \"VEC3\", \"min\": [0, 0, 0], \"max\": [3, 3, 1],",
+            "accessor 4: has no bufferView and too many places",
+        ),
         ("a.bin", "gone.bin", "cannot access "),
         ("a.bin", "https://example.org/a.bin", "buffer 0: \"https://example.org/a.bin\": nothing is fetched"),
         ("a.bin", "data:text/plain,abc", "buffer 0: \"data:text/plain,abc\": data that is not base64"),
