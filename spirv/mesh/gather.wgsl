@@ -15,6 +15,9 @@ struct GatherParams {
     blocks: vec2<u32>,
     // pixels along a block's edge
     step: u32,
+    // `full`: the first row of this part
+    first_row: u32,
+    rows: u32,
     // mm: how far occlusion reaches
     delta: f32,
 }
@@ -65,8 +68,9 @@ fn occlusion_at(view: u32, pixel: vec2<u32>) -> f32 {
 
 @compute @workgroup_size(8, 8)
 fn full(@builtin(global_invocation_id) id: vec3<u32>) {
-    if all(id.xy < params.size) {
-        accessibility.pixel[pixel_index(params.size, id.z, id.xy)] = 1.0 - min(occlusion_at(id.z, id.xy), 1.0);
+    let pixel = vec2(id.x, params.first_row + id.y);
+    if id.y < params.rows && all(pixel < params.size) {
+        accessibility.pixel[pixel_index(params.size, id.z, pixel)] = 1.0 - min(occlusion_at(id.z, pixel), 1.0);
     }
 }
 

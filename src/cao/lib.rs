@@ -74,6 +74,7 @@ pub mod features;
 pub mod field;
 pub mod histograms;
 pub mod host;
+pub mod image_space;
 pub mod mesh;
 pub mod method;
 pub mod network;

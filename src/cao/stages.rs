@@ -94,6 +94,8 @@ pub const GBUFFER: Stage = Stage::new("gbuffer", Phase::Draw);
 pub const TRACE: Stage = Stage::new("trace", Phase::Ambient);
 /// Occlusion of pixels by volumes of triangles.
 pub const GATHER: Stage = Stage::new("gather", Phase::Ambient);
+/// Occlusion of pixels by volumes of triangles, drawn.
+pub const VOLUMES: Stage = Stage::new("volumes", Phase::Ambient);
 /// Occlusion of all pixels from that of some.
 pub const UPSAMPLE: Stage = Stage::new("upsample", Phase::Ambient);
 /// Pixels that no other is like.

@@ -118,6 +118,8 @@ pub enum Blend {
     None,
     /// `new + (1 - new alpha) * stored`, for colours already multiplied by their alpha.
     Premultiplied,
+    /// `new + stored`.
+    Add,
 }
 
 impl Gpu {
@@ -207,13 +209,17 @@ impl Gpu {
                 DepthTest::Greater => vk::CompareOp::GREATER,
                 DepthTest::GreaterOrEqual => vk::CompareOp::GREATER_OR_EQUAL,
             });
+        let kept = match desc.blend {
+            Blend::Add => vk::BlendFactor::ONE,
+            Blend::None | Blend::Premultiplied => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        };
         let attachment = vk::PipelineColorBlendAttachmentState::default()
             .color_write_mask(vk::ColorComponentFlags::RGBA)
-            .blend_enable(desc.blend == Blend::Premultiplied)
+            .blend_enable(desc.blend != Blend::None)
             .src_color_blend_factor(vk::BlendFactor::ONE)
-            .dst_color_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA)
+            .dst_color_blend_factor(kept)
             .src_alpha_blend_factor(vk::BlendFactor::ONE)
-            .dst_alpha_blend_factor(vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+            .dst_alpha_blend_factor(kept);
         let attachments = vec![attachment; desc.colours.len()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default()
@@ -256,7 +262,7 @@ fn check_graphics(gpu: &Inner, name: &str, desc: &GraphicsDesc<'_>) -> Result<()
     let blends = |format: &Format| feature::blends(&gpu.instance, gpu.physical, format.vk());
     let unblended = match desc.blend {
         Blend::None => None,
-        Blend::Premultiplied => desc.colours.iter().find(|format| !blends(format)),
+        Blend::Premultiplied | Blend::Add => desc.colours.iter().find(|format| !blends(format)),
     };
     if let Some(format) = unblended {
         return Err(Error::Config {

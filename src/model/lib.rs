@@ -10,6 +10,7 @@ pub mod error;
 pub mod feature;
 pub mod fit;
 pub mod frame;
+pub mod image_space;
 pub mod light;
 pub mod lit;
 pub mod look;

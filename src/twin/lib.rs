@@ -12,6 +12,7 @@ pub mod draw;
 pub mod features;
 pub mod field;
 pub mod histograms;
+pub mod image_space;
 pub mod measure;
 pub mod mesh;
 pub mod network;

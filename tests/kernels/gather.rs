@@ -24,7 +24,7 @@ fn sums_of(gpu: &cao_gpu::Gpu, pixels: &Pixels, delta: f32) -> Vec<f32> {
     let (gather, accessibility) = (Gather::new(gpu).unwrap(), pixels.values(gpu));
     let scene =
         Scene { geometry: &pixels.geometry, surfaces: &pixels.surfaces, volumes: &volumes, delta_mm: delta };
-    run(gpu, |rec| gather.record_full(rec, scene, &accessibility).unwrap());
+    run(gpu, |rec| gather.record_full(rec, scene, 0..pixels.geometry.size()[1], &accessibility).unwrap());
     floats(gpu, &accessibility)
 }
 

@@ -1,5 +1,6 @@
 //! Each kernel against its twin: one module a kernel, under its name.
 
+mod blur;
 mod bounds;
 mod boxes;
 mod brick_distance;
@@ -11,6 +12,7 @@ mod clipping;
 mod clusters;
 mod cone;
 mod conv3;
+mod crytek;
 mod dilate;
 mod examples;
 mod expand;
@@ -21,6 +23,7 @@ mod features;
 mod filter;
 mod gather;
 mod gbuffer;
+mod hbao;
 mod histogram;
 mod labels;
 mod lao;
@@ -48,3 +51,5 @@ mod tiles;
 mod trace;
 mod upsample;
 mod vicinity;
+mod volumes;
+mod volumetric;

@@ -26,7 +26,7 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
     let scene =
         Scene { geometry: &pixels.geometry, surfaces: &pixels.surfaces, volumes: &volumes, delta_mm: DELTA };
     let every = pixels.values(&gpu);
-    run(&gpu, |rec| gather.record_full(rec, scene, &every).unwrap());
+    run(&gpu, |rec| gather.record_full(rec, scene, 0..SIZE[1], &every).unwrap());
     let full = floats(&gpu, &every);
     let shown = views.map(|view| gbuffer(&world, &view, SIZE));
     let mut failures = Vec::new();

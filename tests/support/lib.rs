@@ -1,9 +1,10 @@
 //! What tests share: a device under validation, fields on it and back, sizes, random fields, meshes ([`meshes`] of several
-//! parts too), [`scan`]s as files, [`networks`] and what PyTorch makes of them; [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
+//! parts too), [`image_space`]: what pixels show, [`scan`]s as files, [`networks`] and what PyTorch makes of them; [`fuzz`] for inputs near valid ones; [`wgsl`] for tests that bring kernels of their own.
 
 #![deny(unsafe_code)]
 
 pub mod fuzz;
+pub mod image_space;
 pub mod meshes;
 pub mod networks;
 pub mod scan;

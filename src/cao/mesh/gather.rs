@@ -7,6 +7,7 @@ use crate::mesh::geometry::Geometry;
 use crate::mesh::surfaces::{Surfaces, VolumeTree};
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Pipeline, Recorder};
 use cao_kernels::gather as kernel;
+use std::ops::Range;
 
 /// The kernel `gather`.
 pub struct Gather {
@@ -55,11 +56,24 @@ impl Gather {
     }
 
     fn params(scene: Scene, blocks: [u32; 2], step: u32) -> kernel::GatherParams {
-        kernel::GatherParams { size: scene.geometry.size(), blocks, step, delta: scene.delta_mm }
+        kernel::GatherParams {
+            size: scene.geometry.size(),
+            blocks,
+            step,
+            first_row: 0,
+            rows: 0,
+            delta: scene.delta_mm,
+        }
     }
 
-    /// Every pixel; `accessibility` holds an f32 each.
-    pub fn record_full(&self, rec: &mut Recorder, scene: Scene, accessibility: &Buffer) -> Result<()> {
+    /// Every pixel of some rows of all views; `accessibility` holds an f32 for each of the picture.
+    pub fn record_full(
+        &self,
+        rec: &mut Recorder,
+        scene: Scene,
+        rows: Range<u32>,
+        accessibility: &Buffer,
+    ) -> Result<()> {
         let Scene { geometry, surfaces, volumes, .. } = scene;
         let binds = kernel::FullBindings {
             eyes: &geometry.eyes,
@@ -68,9 +82,12 @@ impl Gather {
             geometry: &geometry.pixels,
             accessibility,
         };
-        let params = Self::params(scene, [0; 2], 1);
-        let [width, height] = geometry.size();
-        let over = [width, height, geometry.views() as u32];
+        let params = kernel::GatherParams {
+            first_row: rows.start,
+            rows: rows.len() as u32,
+            ..Self::params(scene, [0; 2], 1)
+        };
+        let over = [geometry.size()[0], rows.len() as u32, geometry.views() as u32];
         Ok(rec.dispatch_over(&self.full, &binds, bytemuck::bytes_of(&params), over)?)
     }
 

@@ -1,9 +1,12 @@
 //! Surfaces: what pixels show of them, their ambient occlusion by rays and by volumes, their light.
 
+pub mod ambient;
 pub mod gather;
 pub mod gbuffer;
 pub mod geometry;
 pub mod light;
+pub mod renderer;
 pub mod surfaces;
 pub mod trace;
 pub mod upsample;
+pub mod volumes;

@@ -11,6 +11,7 @@ use crate::stages;
 use crate::{Error, Result};
 use cao_gpu::{Access, Recorder};
 use cao_model::look::Look;
+use cao_model::view::View;
 use std::ops::Range;
 use std::sync::PoisonError;
 
@@ -22,6 +23,8 @@ pub(super) struct Shot<'a> {
     pub picture: &'a Picture,
     /// Where it goes from there, and what ends its rays.
     pub targets: Option<&'a Targets<'a>>,
+    /// Whether the picture's depth holds how far rays go.
+    pub ended: bool,
 }
 
 impl Renderer {
@@ -40,8 +43,27 @@ impl Renderer {
         self.current()?;
         look.check()?;
         let drawn = self.affordable(look, picture.size());
-        self.record_shot(rec, &Shot { views: views.into(), look, picture, targets: None }, drawn)?;
+        self.record_shot(
+            rec,
+            &Shot { views: views.into(), look, picture, targets: None, ended: false },
+            drawn,
+        )?;
         Ok(drawn)
+    }
+
+    /// As [`Self::record_picture`], all of it, with rays that end where the picture's depth says: view depths in mm.
+    pub(crate) fn record_ended(
+        &self,
+        rec: &mut Recorder,
+        views: &[View],
+        look: &Look,
+        picture: &Picture,
+    ) -> Result<()> {
+        self.current()?;
+        let step_mm = look.step(self.subject.field.min_spacing());
+        let drawn = Drawn { size: picture.size(), step_mm, quality: Quality::FULL };
+        let shot = Shot { views: views.into(), look, picture, targets: None, ended: true };
+        self.record_shot(rec, &shot, drawn)
     }
 
     fn record_shot(&self, rec: &mut Recorder, shot: &Shot, drawn: Drawn) -> Result<()> {
@@ -98,9 +120,11 @@ impl Renderer {
         );
         if tiles.start == 0 {
             rec.discard(&picture.colour);
-            rec.discard(&picture.depth);
+            if !shot.ended {
+                rec.discard(&picture.depth);
+            }
         }
-        let ended = self.record_scenes(rec, shot, band.size)?;
+        let ended = self.record_scenes(rec, shot, band.size)? || shot.ended;
         rec.stage(stages::RAYCAST)?;
         let bindings = Bindings {
             field,
@@ -169,7 +193,7 @@ impl Renderer {
         };
         let picture = presented.insert(picture);
         let drawn = self.affordable(look, size);
-        self.record_shot(rec, &Shot { views, look, picture, targets: Some(targets) }, drawn)?;
+        self.record_shot(rec, &Shot { views, look, picture, targets: Some(targets), ended: false }, drawn)?;
         // A scene's depth may be where theirs goes.
         rec.barrier(&[Access::SampledRead], &[Access::AttachmentWrite]);
         rec.stage(stages::PRESENT)?;

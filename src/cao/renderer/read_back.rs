@@ -7,7 +7,7 @@ use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::drive::{Slice, add};
 use crate::{Error, Result};
-use cao_gpu::{Access, Buffer, BufferUse, Recorder, Timing, Timings};
+use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timing, Timings};
 use cao_kernels::raycast::TILE;
 use cao_model::look::Look;
 use cao_model::memory;
@@ -37,6 +37,20 @@ impl<const VIEWS: usize> StereoImage<VIEWS> {
             colour: std::array::from_fn(|_| Vec::with_capacity(pixels)),
             depth: std::array::from_fn(|_| Vec::with_capacity(pixels)),
         }
+    }
+
+    /// All of a picture that kernels have written, of as many views. Uses the device's queue and waits for it.
+    pub(crate) fn read(gpu: &Gpu, picture: &Picture) -> Result<Self> {
+        let [width, height] = picture.size();
+        let bytes = PIXEL * u64::from(width) * u64::from(height) * VIEWS as u64;
+        let read_back = gpu.buffer("image read-back", bytes, BufferUse::Readback)?;
+        let mut rec = gpu.recorder("read picture")?;
+        rec.barrier(&[Access::StorageWrite], &[Access::TransferRead]);
+        record_read_back(&mut rec, picture, [width, height], &read_back)?;
+        rec.submit_and_wait()?;
+        let mut image = Self::with_room([width, height]);
+        image.fill(Band::whole([width, height]), &read_back)?;
+        Ok(image)
     }
 
     /// Takes in what `read_back` holds of a band: the colours of all views, then their depths.
@@ -153,11 +167,12 @@ impl<'a> Drawing<'a> {
                 look: self.look,
                 picture: &self.picture,
                 targets: None,
+                ended: false,
             };
             self.renderer.record_tiles(&mut rec, &shot, band, range)?;
             done += tiles;
             if done == band.tiles() {
-                self.record_read_back(&mut rec, band)?;
+                record_read_back(&mut rec, &self.picture, [band.size[0], band.rows], &self.read_back)?;
             }
             let start = Instant::now();
             for Timing { stage, ms } in rec.submit_and_wait()? {
@@ -167,17 +182,17 @@ impl<'a> Drawing<'a> {
         }
         Ok(())
     }
+}
 
-    /// The colours of all views, then their depths: a copy begins at a multiple of a texel.
-    fn record_read_back(&self, rec: &mut Recorder, band: Band) -> Result<()> {
-        let (extent, mut at) = ([band.size[0], band.rows, 1], 0);
-        for image in [&self.picture.colour, &self.picture.depth] {
-            for view in 0..self.views.len() as u32 {
-                rec.copy_image_to_buffer(image, view, [0; 3], extent, &self.read_back, at)?;
-                at += u64::from(extent[0]) * u64::from(extent[1]) * image.desc().format.bytes();
-            }
+/// The colours of all views, then their depths: a copy begins at a multiple of a texel.
+fn record_read_back(rec: &mut Recorder, picture: &Picture, size: [u32; 2], to: &Buffer) -> Result<()> {
+    let (extent, mut at) = ([size[0], size[1], 1], 0);
+    for image in [&picture.colour, &picture.depth] {
+        for view in 0..picture.views() as u32 {
+            rec.copy_image_to_buffer(image, view, [0; 3], extent, to, at)?;
+            at += u64::from(extent[0]) * u64::from(extent[1]) * image.desc().format.bytes();
         }
-        rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
-        Ok(())
     }
+    rec.barrier(&[Access::TransferWrite], &[Access::HostRead]);
+    Ok(())
 }

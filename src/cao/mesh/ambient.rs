@@ -1,0 +1,146 @@
+//! The seam of methods whose values belong to pixels, and those that read the triangles of the world.
+
+use crate::Result;
+use crate::mesh::gather::{Blocks, Gather, Scene};
+use crate::mesh::geometry::Geometry;
+use crate::mesh::surfaces::{Surfaces, VolumeTree};
+use crate::mesh::trace::Trace;
+use crate::mesh::upsample::Upsample;
+use crate::stages;
+use cao_gpu::{Access, Buffer, Gpu, Recorder};
+
+/// Gives each pixel the light that reaches it.
+pub trait PixelAmbient {
+    /// Makes ready what it needs of a world and of pictures of this size. Uses the device's queue and waits for it.
+    ///
+    /// # Errors
+    /// A reach that is no length; a device without memory.
+    fn prepare(&mut self, on: &Pixels) -> Result<()>;
+
+    /// How many recordings the values of a picture take, none of which keeps a slow device for much longer than a tenth of a second.
+    fn parts(&self, on: &Pixels) -> u32;
+
+    /// Records one of them, in order; after the last `accessibility` holds 1 − AO of each pixel, an f32 in the order of the geometry. Barriers
+    /// between parts, and after the last, are its caller's.
+    ///
+    /// # Errors
+    /// Pictures of another size than prepared for.
+    fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()>;
+}
+
+/// What such a method has before it.
+#[derive(Clone, Copy)]
+pub struct Pixels<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// Normals and depths.
+    pub geometry: &'a Geometry,
+    /// The triangles they are of.
+    pub surfaces: &'a Surfaces,
+    /// How far occlusion reaches, in mm.
+    pub delta_mm: f32,
+}
+
+/// Rays, [`Trace`].
+pub struct ByRays {
+    trace: Trace,
+    rays: u32,
+}
+
+/// Rays times pixels of a part: some hundredth of a second of a software driver at each of ten thousand triangles' depth of tree.
+const RAYS_OF_A_PART: u32 = 1 << 17;
+
+impl ByRays {
+    /// So many a pixel.
+    pub fn new(gpu: &Gpu, rays: u32) -> Result<Self> {
+        Ok(Self { trace: Trace::new(gpu)?, rays })
+    }
+
+    fn of_a_part(on: &Pixels) -> u32 {
+        let [width, height] = on.geometry.size();
+        (RAYS_OF_A_PART / (width * height * on.geometry.views() as u32).max(1)).max(1)
+    }
+}
+
+impl PixelAmbient for ByRays {
+    fn prepare(&mut self, _: &Pixels) -> Result<()> {
+        Ok(())
+    }
+
+    fn parts(&self, on: &Pixels) -> u32 {
+        self.rays.div_ceil(Self::of_a_part(on))
+    }
+
+    fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
+        let Pixels { geometry, surfaces, delta_mm, .. } = *on;
+        let rays = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
+        rec.stage(stages::TRACE)?;
+        self.trace.record(rec, surfaces, geometry, delta_mm, rays, self.rays, accessibility)?;
+        Ok(rec.end_stage()?)
+    }
+}
+
+/// Ambient occlusion volumes, gathered: of all pixels, or of some with a joint bilateral mean between.
+pub struct ByVolumes {
+    gather: Gather,
+    upsample: Upsample,
+    step: u32,
+    made: Option<(VolumeTree, Option<Blocks>)>,
+}
+
+/// Pixels of a part of all: a tenth of a second of a software driver where each lies in some hundred volumes.
+const PIXELS_OF_A_PART: u32 = 1 << 14;
+
+impl ByVolumes {
+    /// Every `step`-th pixel in each direction.
+    pub fn new(gpu: &Gpu, step: u32) -> Result<Self> {
+        Ok(Self { gather: Gather::new(gpu)?, upsample: Upsample::new(gpu)?, step, made: None })
+    }
+
+    /// Some thousands of pixels, whole workgroups.
+    fn rows_of_a_part(on: &Pixels) -> u32 {
+        let row = on.geometry.size()[0] * on.geometry.views() as u32;
+        (PIXELS_OF_A_PART / row.max(1)).max(1).next_multiple_of(8)
+    }
+
+    /// How many pixels the last picture computed for themselves, for no block was like them: a u32.
+    pub fn failures(&self) -> &Buffer {
+        &self.upsample.failures
+    }
+}
+
+impl PixelAmbient for ByVolumes {
+    fn prepare(&mut self, on: &Pixels) -> Result<()> {
+        let blocks = (self.step > 1).then(|| Blocks::new(on.gpu, on.geometry, self.step)).transpose()?;
+        self.made = Some((on.surfaces.volumes(on.gpu, on.delta_mm)?, blocks));
+        Ok(())
+    }
+
+    fn parts(&self, on: &Pixels) -> u32 {
+        if self.step == 1 { on.geometry.size()[1].div_ceil(Self::rows_of_a_part(on)) } else { 1 }
+    }
+
+    fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
+        let Some((volumes, blocks)) = &self.made else {
+            return Err(crate::Error::refused("ambient occlusion of pixels", "is not prepared"));
+        };
+        let Pixels { geometry, surfaces, delta_mm, .. } = *on;
+        let scene = Scene { geometry, surfaces, volumes, delta_mm };
+        rec.stage(stages::GATHER)?;
+        let Some(blocks) = blocks else {
+            let (rows, height) = (Self::rows_of_a_part(on), geometry.size()[1]);
+            let rows = part * rows..((part + 1) * rows).min(height);
+            self.gather.record_full(rec, scene, rows, accessibility)?;
+            return Ok(rec.end_stage()?);
+        };
+        self.gather.record_sparse(rec, scene, blocks)?;
+        rec.end_stage()?;
+        rec.stage(stages::UPSAMPLE)?;
+        self.upsample.record(rec, scene, blocks, accessibility)?;
+        rec.end_stage()?;
+        rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+        rec.stage(stages::FAILED)?;
+        self.gather.record_failed(rec, scene, accessibility)?;
+        Ok(rec.end_stage()?)
+    }
+}
