@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 /// Cases of the test with files near valid ones: under two seconds.
-const CASES: u32 = 300;
+const CASES: u32 = 200;
 
 /// A PNG of these pixels.
 pub fn png(

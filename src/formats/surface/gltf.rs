@@ -51,6 +51,14 @@ pub(super) fn load(path: &Path) -> Result<Vec<Instance>> {
             format!("{}, which is not read; export without it", quoted(name)),
         ));
     }
+    // The crate's own checks panic at this one.
+    let there = |primitive: &Primitive| {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        positions.is_none_or(|index| root.get(*index).is_some())
+    };
+    if let Some(number) = root.meshes.iter().position(|mesh| !mesh.primitives.iter().all(there)) {
+        return Err(wrong(&format!("mesh {number}"), "names a POSITION that is not there".into()));
+    }
     let mut fault = None;
     root.validate(root, gltf::json::Path::new, &mut |at, error| {
         // What is required was looked at.
