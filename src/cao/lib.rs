@@ -76,6 +76,7 @@ pub mod histograms;
 pub mod host;
 pub mod image_space;
 pub mod mesh;
+pub mod mesh_renderer;
 pub mod method;
 pub mod network;
 pub mod pyramid;
@@ -105,6 +106,7 @@ pub use cao_model::view::{StereoRig, View};
 pub use cao_model::volume::Volume;
 pub use error::{Error, Result};
 pub use gpu::{Gpu, OpenOptions};
+pub use mesh_renderer::MeshRenderer;
 pub use renderer::Renderer;
 
 /// The version whose vectors are in this crate's signatures.

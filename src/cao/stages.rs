@@ -98,6 +98,8 @@ pub const GATHER: Stage = Stage::new("gather", Phase::Ambient);
 pub const VOLUMES: Stage = Stage::new("volumes", Phase::Ambient);
 /// Occlusion of all pixels from that of some.
 pub const UPSAMPLE: Stage = Stage::new("upsample", Phase::Ambient);
+/// Occlusion of pixels by what the image shows.
+pub const IMAGE_SPACE: Stage = Stage::new("image space", Phase::Ambient);
 /// Pixels that no other is like.
 pub const FAILED: Stage = Stage::new("failed pixels", Phase::Ambient);
 /// The light of surfaces.

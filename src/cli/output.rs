@@ -9,7 +9,9 @@ use cao_model::feature::Features;
 use cao_model::light::AmbientLight;
 use cao_model::options::Options;
 use cao_model::order::Layout;
+use cao_model::pixel_occlusion::PixelOcclusion;
 use cao_model::settings::Setup;
+use cao_model::surface::World;
 use cao_model::volume::Volume;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value, json};
@@ -70,6 +72,33 @@ impl Out {
         self.json(json!({
             "volume": name.as_ref().to_string_lossy(), "dims": dims, "spacing_mm": spacing,
             "type": volume.values.kind()
+        }));
+    }
+
+    /// Meshes, and how their pixels are occluded.
+    pub fn meshes(&mut self, world: &World, occlusion: &PixelOcclusion, delta_mm: f32) {
+        let (triangles, materials) = (world.triangles.len(), world.materials.len());
+        let left_out = match world.degenerate {
+            0 => String::new(),
+            n => format!(", {n} without area left out"),
+        };
+        self.line(format!("meshes    {triangles} triangles{left_out}, {materials} materials"));
+        let method = occlusion.method.name();
+        let entry = occlusion.method.entry();
+        let mut how = String::new();
+        if entry.rays.is_some() {
+            how += &format!(", {} rays", occlusion.rays);
+        }
+        if entry.samples.is_some() {
+            how += &format!(", {} samples", occlusion.samples);
+        }
+        if occlusion.sparse > 1 {
+            how += &format!(", 1 of {} pixels", occlusion.sparse.pow(2));
+        }
+        self.line(format!("surfaces  {method}{how}, delta {delta_mm} mm"));
+        self.json(json!({
+            "triangles": triangles, "degenerate_triangles": world.degenerate, "materials": materials,
+            "mesh_method": method, "delta_mm": delta_mm, "sparse": occlusion.sparse,
         }));
     }
 

@@ -72,7 +72,8 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         source: "after Mittring",
         world: false,
         rays: None,
-        samples: Some(16),
+        // 16, as published.
+        samples: None,
         sparse: &[1],
     },
     PixelEntry {
@@ -241,7 +242,7 @@ mod tests {
             (PixelOcclusion { rays: 0, ..of(PixelMethod::Rays) }, "rays: 0: expected 1 to 65536"),
             (PixelOcclusion { rays: 9, ..of(PixelMethod::Aov) }, "rays: 9: the method aov has no rays"),
             (
-                PixelOcclusion { samples: 1025, ..of(PixelMethod::Crytek) },
+                PixelOcclusion { samples: 1025, ..of(PixelMethod::Volumetric) },
                 "samples: 1025: expected 1 to 1024",
             ),
             (PixelOcclusion { samples: 2, ..of(PixelMethod::Rays) }, "the method rays has no samples"),

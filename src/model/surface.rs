@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 use crate::clip::Pose;
 use crate::{Error, Result};
@@ -303,6 +303,15 @@ impl World {
             return Err(Error::Mesh { name: surface.name.clone(), problem });
         }
         Ok(())
+    }
+
+    /// The same, turned about the origin: a scene on the axes of its volume.
+    pub fn turned(mut self, rotation: Quat) -> Self {
+        for triangle in &mut self.triangles {
+            triangle.corners = triangle.corners.map(|corner| rotation * corner);
+            triangle.normals = triangle.normals.map(|normal| rotation * normal);
+        }
+        self
     }
 
     /// Smallest and largest coordinates in mm.

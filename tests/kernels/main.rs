@@ -45,6 +45,7 @@ mod rays;
 mod reference;
 mod resize;
 mod shading;
+mod shares;
 mod ssao;
 mod sums;
 mod tiles;

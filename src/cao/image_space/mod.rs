@@ -11,5 +11,6 @@
 pub mod blur;
 pub mod crytek;
 pub mod hbao;
+pub mod method;
 pub mod shade;
 pub mod volumetric;

@@ -5,7 +5,7 @@ pub mod gather;
 pub mod gbuffer;
 pub mod geometry;
 pub mod light;
-pub mod renderer;
+pub mod shares;
 pub mod surfaces;
 pub mod trace;
 pub mod upsample;

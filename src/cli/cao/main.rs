@@ -8,6 +8,7 @@ mod chart;
 mod devices;
 mod examples;
 mod info;
+mod meshes;
 mod occlusion;
 mod render;
 mod stability;

@@ -1,7 +1,7 @@
 //! `cao render`: a picture for both eyes.
 
 use crate::args::{self, Global, Render, usage};
-use crate::budget;
+use crate::{budget, meshes};
 use anyhow::Result;
 use cao::renderer::{Bands, COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
@@ -36,6 +36,9 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         false => Scene::default_for(args.raw.source(&args.input)?),
     };
     override_scene(&mut scene, args, matches)?;
+    if !scene.meshes.is_empty() {
+        return meshes::run(global, args, scene, &targets, progress);
+    }
     let volume =
         args::open(args::volume_of(&scene, &args.input)?, args.raw.choices.or(scene.reading), &args.input)?;
     let (mut volume, turn) = scene.frame.arrange(volume)?;
@@ -180,7 +183,7 @@ fn override_scene(scene: &mut Scene, args: &Render, matches: &ArgMatches) -> Res
 }
 
 /// The files, which grow from band to band.
-struct Pictures {
+pub struct Pictures {
     background: [f32; 3],
     /// Left and right, side by side.
     both: Option<GrowingPng>,
@@ -189,7 +192,8 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn begin(
+    /// As the flags ask for, of this size.
+    pub fn begin(
         files: &Outputs,
         args: &Render,
         [width, height]: [u32; 2],
@@ -203,7 +207,8 @@ impl Pictures {
         })
     }
 
-    fn add(&mut self, band: &StereoImage) -> Result<()> {
+    /// The next rows.
+    pub fn add(&mut self, band: &StereoImage) -> Result<()> {
         let [width, rows] = band.size;
         let eyes = band.colour.each_ref().map(|eye| Picture::over(width, rows, eye, self.background));
         if let Some(both) = &mut self.both {
@@ -212,7 +217,8 @@ impl Pictures {
         self.eyes.iter_mut().zip(&eyes).try_for_each(|(png, eye)| Ok(png.add(&eye.pixels)?))
     }
 
-    fn finish(self, files: &mut Outputs) -> Result<()> {
+    /// Keeps them.
+    pub fn finish(self, files: &mut Outputs) -> Result<()> {
         self.both.into_iter().chain(self.eyes).try_for_each(|png| Ok(files.keep(png.finish()?)?))
     }
 }

@@ -10,6 +10,7 @@
 
 use crate::draw::picture::Picture;
 use crate::drive::add;
+use crate::image_space::method::{ByImage, image_method};
 use crate::mesh::ambient::{ByRays, ByVolumes, PixelAmbient, Pixels};
 use crate::mesh::gbuffer::Gbuffer;
 use crate::mesh::geometry::Geometry;
@@ -18,8 +19,10 @@ use crate::mesh::surfaces::Surfaces;
 use crate::renderer::{Renderer, StereoImage};
 use crate::{Error, Result, stages};
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timing, Timings};
+use cao_model::clip::Clip;
 use cao_model::look::Look;
 use cao_model::pixel_occlusion::{PixelMethod, PixelOcclusion};
+use cao_model::settings::MapSettings;
 use cao_model::surface::World;
 use cao_model::view::View;
 
@@ -48,19 +51,41 @@ impl MeshRenderer {
     /// Settings that the method does not have; a world without triangles; a device without memory.
     pub fn new(gpu: &Gpu, world: &World, occlusion: PixelOcclusion) -> Result<Self> {
         occlusion.check()?;
+        let delta_mm = occlusion.delta_mm(world.bounds());
         let method: Box<dyn PixelAmbient> = match occlusion.method {
+            PixelMethod::Aov => Box::new(ByVolumes::new(gpu, occlusion.sparse)?),
             PixelMethod::Rays => Box::new(ByRays::new(gpu, occlusion.rays)?),
-            _ => Box::new(ByVolumes::new(gpu, occlusion.sparse)?),
+            PixelMethod::Crytek | PixelMethod::Volumetric | PixelMethod::Hbao => {
+                let method = image_method(&occlusion, delta_mm);
+                Box::new(ByImage::new(gpu, method.expect("the three are of images"))?)
+            }
         };
+        Self::with(gpu, world, method, delta_mm)
+    }
+
+    /// With a method of one's own: AOV by volumes that are drawn, say.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with(gpu: &Gpu, world: &World, method: Box<dyn PixelAmbient>, delta_mm: f32) -> Result<Self> {
         Ok(Self {
             gpu: gpu.clone(),
             surfaces: Surfaces::new(gpu, world)?,
-            delta_mm: occlusion.delta_mm(world.bounds()),
+            delta_mm,
             method,
             gbuffer: Gbuffer::new(gpu)?,
             light: Light::new(gpu)?,
             frame: None,
         })
+    }
+
+    /// Cuts the world by other clips: what they hide is neither seen nor occludes. Surfaces that are cut open show their backs. Uses the device's queue and
+    /// waits for it; pictures that are recorded already must have run.
+    ///
+    /// # Errors
+    /// More than [`Clip::MAX`], impossible poses, clip meshes that bound no solid: then the clips before stay.
+    pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
+        self.surfaces.set_clips(&self.gpu, clips, MapSettings::default())
     }
 
     /// How far occlusion reaches, in mm.
@@ -183,7 +208,7 @@ impl MeshRenderer {
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         }
         rec.stage(stages::LIGHT)?;
-        self.light.record(rec, lit, views, look, picture, volume.is_some())?;
+        self.light.record(rec, lit, views, look, picture, volume.map(Renderer::shade))?;
         rec.end_stage()?;
         rec.barrier(
             &[Access::StorageWrite],
