@@ -20,6 +20,7 @@
 //! | [`cast`] [`rays`] [`features`] [`spao`] [`cones`] [`tables`] [`vicinity`] [`histograms`] [`network`] | the methods, a room each: kernels' host sides, and what there is to do after a change; [`pyramid`]: what two of them share |
 //! | [`ambient`] [`method`] [`drive`] | what a method is to the renderer; what makes each; the two ways to walk its parts |
 //! | [`by_brick`] | what methods have in common that compute brick by brick from V_o alone |
+//! | [`image_space`] | ambient occlusion of what pixels show of meshes or of a volume's first hit, to compare with |
 //! | [`subject`] [`renderer`] | a scene on the device; the frame: what changed, which parts run for it, all views |
 //! | [`verify`] | instruments: is it exact, do both eyes see the same, what would other settings give |
 //! | [`stages`] | every stage whose time is taken |

@@ -344,7 +344,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "src/cao/mesh_renderer.rs",
         &["draw", "drive", "error", "host", "image_space", "mesh", "renderer", "stages"],
     ),
-    ("src/cao/image_space/", &["error", "mesh", "stages"]),
+    ("src/cao/image_space/", &["error", "draw", "mesh", "stages"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
     ("src/cao/build.rs", &["error", "stages", "ambient"]),

@@ -21,6 +21,7 @@ mod fdao;
 mod feature_colour;
 mod features;
 mod filter;
+mod first_hit;
 mod gather;
 mod gbuffer;
 mod hbao;

@@ -3,8 +3,8 @@
 
 use cao_measure::stability::{
     Effort, Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
-    mip_blocks, motion, network, noise, numbers, pixels, radius, shape, sheets, shells, stacked_layers,
-    stereo, tables, thin_sheets, views,
+    mip_blocks, motion, network, noise, numbers, off_screen, pixels, radius, shape, sheets, shells, slope,
+    stacked_layers, stereo, tables, thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -357,4 +357,30 @@ fn a_network_errs_on_what_it_was_not_trained_on_and_rays_do_not() {
     let beyond = finding.charts.len() - 1;
     assert_eq!(curve(&finding, beyond, "rays").largest(), 0.0);
     assert!(curve(&finding, beyond, "network").largest() > 1e-4, "{}", finding.sentence);
+}
+
+/// On the processor: the twins of image space.
+#[test]
+fn what_leaves_the_picture_occludes_in_the_world_only() {
+    let plan = off_screen::Plan { pixels: 64, turns_deg: vec![0.0, 8.0, 16.0] };
+    let finding = off_screen::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    // The block is still there at 8 degrees: what changes is not the turn.
+    for name in ["Crytek", "Volumetric", "HBAO"] {
+        let curve = curve(&finding, 0, name);
+        assert!(curve.at(16.0) > curve.at(8.0).max(curve.at(0.0)) + off_screen::JUMP, "{curve:?}");
+    }
+    let outside = off_screen::Plan { turns_deg: vec![40.0], ..plan };
+    assert!(off_screen::run(&outside, &mut |_| ()).is_err_and(|e| e.to_string().starts_with("turns_deg")));
+}
+
+#[test]
+fn a_plane_seen_aslant_is_shaded_in_image_space_only() {
+    let plan = slope::Plan { pixels: 64, slopes_deg: vec![0.0, 60.0, 89.0] };
+    let finding = slope::run(&plan, &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    // Seen along its normal it is right, or a half by design.
+    for (name, frontal) in [("Crytek", 0.5), ("Volumetric", 1.0), ("HBAO", 1.0)] {
+        assert!((curve(&finding, 0, name).at(0.0) - frontal).abs() < 1e-6, "{}", finding.sentence);
+    }
 }

@@ -10,6 +10,7 @@
 
 pub mod blur;
 pub mod crytek;
+pub mod first_hit;
 pub mod hbao;
 pub mod method;
 pub mod shade;

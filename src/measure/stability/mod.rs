@@ -18,6 +18,7 @@ pub mod motion;
 pub mod network;
 pub mod noise;
 pub mod numbers;
+pub mod off_screen;
 pub mod page;
 pub mod pixels;
 mod plane_cut;
@@ -26,6 +27,7 @@ pub mod radius;
 pub mod shape;
 pub mod sheets;
 pub mod shells;
+pub mod slope;
 pub mod stacked_layers;
 pub mod stereo;
 pub mod tables;
@@ -200,7 +202,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 23] = [
+pub const TRIALS: [Trial; 25] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -315,6 +317,16 @@ pub const TRIALS: [Trial; 23] = [
         name: "network",
         title: "How wrong is a network about what it was not trained on?",
         run: |_, effort, progress| network::run(&network::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "off-screen",
+        title: "Does a point change when what occludes it leaves the picture?",
+        run: |_, effort, progress| off_screen::run(&off_screen::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "slope",
+        title: "Does a plane occlude itself when it is seen aslant?",
+        run: |_, effort, progress| slope::run(&slope::Plan::of(effort), progress),
     },
 ];
 

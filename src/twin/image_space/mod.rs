@@ -2,6 +2,7 @@
 
 pub mod blur;
 pub mod crytek;
+pub mod first_hit;
 pub mod hbao;
 pub mod scenes;
 pub mod shown;

@@ -21,6 +21,11 @@ impl Shown {
         Self { size, view: *view, pixels: pixels.iter().map(|p| pixel(*p)).collect() }
     }
 
+    /// From normals and depths in mm, `None` where nothing is.
+    pub fn from_pixels(view: &View, size: [usize; 2], pixels: Vec<Option<(DVec3, f64)>>) -> Self {
+        Self { size, view: *view, pixels }
+    }
+
     /// Of a scene that says how far a ray goes, in lengths of its direction, and the normal there. The ray's length is the depth.
     pub fn of(view: &View, size: [usize; 2], hit: impl Fn(DVec3, DVec3) -> Option<(f64, DVec3)>) -> Self {
         let mut shown = Self { size, view: *view, pixels: Vec::new() };
