@@ -40,6 +40,7 @@ var<immediate> params: GatherParams;
 @group(0) @binding(3) var<storage, read> geometry: Geometry;
 @group(0) @binding(4) var<storage, read_write> accessibility: Accessibility;
 @group(0) @binding(5) var<storage, read_write> sparse_sums: Sparse;
+@group(0) @binding(6) var<storage, read> shares: Shares;
 
 fn occlusion_at(view: u32, pixel: vec2<u32>) -> f32 {
     let here = geometry.pixel[pixel_index(params.size, view, pixel)];
@@ -59,7 +60,8 @@ fn occlusion_at(view: u32, pixel: vec2<u32>) -> f32 {
         }
         let first = leaf_first(node);
         for (var k = 0u; k < leaf_count(node); k++) {
-            sum += contribution(triangles.triangle[first + k], point, here.xyz, params.delta, nothing);
+            let triangle = triangles.triangle[first + k];
+            sum += contribution(triangle, shares.triangle[first + k], point, here.xyz, params.delta, nothing);
         }
         i++;
     }

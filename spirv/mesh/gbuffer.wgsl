@@ -24,6 +24,8 @@ var<immediate> params: GbufferParams;
 @group(0) @binding(5) var<storage, read> texels: Texels;
 @group(0) @binding(6) var<storage, read_write> geometry: Geometry;
 @group(0) @binding(7) var<storage, read_write> hits: Hits;
+@group(0) @binding(8) var<storage, read> clips: Clips;
+@group(0) @binding(9) var<storage, read> layers: Layers;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {

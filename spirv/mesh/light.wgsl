@@ -1,6 +1,9 @@
 // The picture of a world: what each pixel's surface sends towards the eye, and its depth.
 //
-//   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain/2 accessibility, 1) where it is shown, else 1; the rest as in shading.wgsl
+//   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain/2 accessibility V_AO, 1) where it is shown, else 1; the rest as in shading.wgsl
+//
+// V_AO is the volume's ambient factor a voxel in front of the surface, 1 outside the volume and without one: what the volume hides of all
+// directions is taken for what it hides of those in front.
 //
 // Half the accessibility is the share of all directions that is open, which the gain of volumes is for: a flat wall's is 1/2 there too.
 // `ends` is for a volume's rays, which end at the surface; `over` lays what they gave over it.
@@ -23,7 +26,20 @@ struct LightParams {
     light_x: f32,
     light_y: f32,
     light_z: f32,
+    // voxels of the volume and their size in mm; what its ambient texels hold
+    dims_x: f32,
+    dims_y: f32,
+    dims_z: f32,
+    spacing_x: f32,
+    spacing_y: f32,
+    spacing_z: f32,
+    texels: u32,
 }
+
+// One factor; red, green, blue; the factors of four parts, of which the least counts.
+const GREY = 0u;
+const COLOURED = 1u;
+const PARTS_OF_FOUR = 2u;
 
 struct Hits {
     pixel: array<vec2<u32>>,
@@ -44,6 +60,8 @@ var<immediate> params: LightParams;
 @group(0) @binding(7) var<storage, read> accessibility: Accessibility;
 @group(0) @binding(8) var colours: texture_storage_2d_array<rgba32float, read_write>;
 @group(0) @binding(9) var depths: texture_storage_2d_array<r32float, read_write>;
+@group(0) @binding(10) var ambient: texture_3d<f32>;
+@group(0) @binding(11) var edge: sampler;
 
 // Farther than anything.
 const NOWHERE = 3e38;
@@ -52,7 +70,31 @@ fn linear_of(coded: vec3<f32>) -> vec3<f32> {
     return select(pow((coded + 0.055) / 1.055, vec3(2.4)), coded / 12.92, coded <= vec3(0.04045));
 }
 
-fn light_at(index: u32, eye: Eye, pixel: vec2<u32>) -> vec3<f32> {
+// V_AO in front of what a pixel shows.
+fn volume_factor(index: u32, eye: Eye, pixel: vec2<u32>) -> vec3<f32> {
+    let here = geometry.pixel[index];
+    let dims = vec3(params.dims_x, params.dims_y, params.dims_z);
+    let spacing = vec3(params.spacing_x, params.spacing_y, params.spacing_z);
+    let voxel = min(spacing.x, min(spacing.y, spacing.z));
+    let place = (position_of(eye, params.size, pixel, here.w) + voxel * here.xyz) / (spacing * dims) + 0.5;
+    if any(place < vec3(0.0)) || any(place > vec3(1.0)) {
+        return vec3(1.0);
+    }
+    let texel = textureSampleLevel(ambient, edge, place, 0.0);
+    switch params.texels {
+        case COLOURED: {
+            return texel.rgb;
+        }
+        case PARTS_OF_FOUR: {
+            return vec3(min(min(texel.r, texel.g), min(texel.b, texel.a)));
+        }
+        default: {
+            return vec3(texel.r);
+        }
+    }
+}
+
+fn light_at(index: u32, eye: Eye, pixel: vec2<u32>, factor: vec3<f32>) -> vec3<f32> {
     let hit = hits.pixel[index];
     let at = unpack2x16unorm(hit.y);
     let look = looks.triangle[hit.x];
@@ -70,8 +112,9 @@ fn light_at(index: u32, eye: Eye, pixel: vec2<u32>) -> vec3<f32> {
     let half_way = light + towards_eye;
     let mirrored = min(max(dot(normal, half_way), 0.0) / max(length(half_way), 1e-6), 1.0);
     let highlight = slope * pow(mirrored, params.shininess);
-    let open = mix(1.0, min(0.5 * params.gain * accessibility.pixel[index], 1.0), params.occluded);
-    let open_rest = mix(1.0, open, params.occluded_rest);
+    let shown = min(0.5 * params.gain * accessibility.pixel[index] * factor, vec3(1.0));
+    let open = mix(vec3(1.0), shown, params.occluded);
+    let open_rest = mix(vec3(1.0), open, params.occluded_rest);
     let matt = open * params.ambient + open_rest * params.diffuse * slope;
     return matt * colour + open_rest * params.specular * highlight;
 }
@@ -90,7 +133,7 @@ fn alone(@builtin(global_invocation_id) id: vec3<u32>) {
         textureStore(depths, id.xy, id.z, vec4(eye.depth.x + eye.depth.y / eye.depth.w, 0.0, 0.0, 0.0));
         return;
     }
-    textureStore(colours, id.xy, id.z, vec4(light_at(index, eye, id.xy), 1.0));
+    textureStore(colours, id.xy, id.z, vec4(light_at(index, eye, id.xy, vec3(1.0)), 1.0));
     textureStore(depths, id.xy, id.z, vec4(eye.depth.x + eye.depth.y / depth, 0.0, 0.0, 0.0));
 }
 
@@ -116,7 +159,7 @@ fn over(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let eye = eyes.eye[id.z];
     let front = textureLoad(colours, id.xy, id.z);
-    let behind = light_at(index, eye, id.xy);
+    let behind = light_at(index, eye, id.xy, volume_factor(index, eye, id.xy));
     textureStore(colours, id.xy, id.z, vec4(front.rgb + (1.0 - front.a) * behind, 1.0));
     if front.a < 0.5 {
         textureStore(depths, id.xy, id.z, vec4(eye.depth.x + eye.depth.y / depth, 0.0, 0.0, 0.0));

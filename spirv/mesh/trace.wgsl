@@ -36,6 +36,8 @@ var<immediate> params: TraceParams;
 @group(0) @binding(5) var<storage, read> texels: Texels;
 @group(0) @binding(6) var<storage, read> geometry: Geometry;
 @group(0) @binding(7) var<storage, read_write> accessibility: Accessibility;
+@group(0) @binding(8) var<storage, read> clips: Clips;
+@group(0) @binding(9) var<storage, read> layers: Layers;
 
 const TAU = 6.28318530718;
 

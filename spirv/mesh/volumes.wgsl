@@ -48,6 +48,7 @@ var<immediate> params: VolumesParams;
 @group(0) @binding(5) var<storage, read_write> corners_to_make: Corners;
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var<storage, read_write> accessibility: Accessibility;
+@group(0) @binding(8) var<storage, read> shares: Shares;
 
 // Where a vertex of a volume is: a corner of its base, and 1 over it.
 fn place_in(vertex: u32, corners: u32) -> vec2<u32> {
@@ -135,7 +136,9 @@ fn occlude(in: Vertex) -> @location(0) f32 {
     let pixel = vec2<u32>(in.position.xy);
     let here = geometry.pixel[pixel_index(params.size, params.view, pixel)];
     let point = position_of(eyes.eye[params.view], params.size, pixel, here.w);
-    return contribution(triangles.triangle[in.triangle], point, here.xyz, params.delta, uncertainty(point, here.w));
+    let triangle = triangles.triangle[in.triangle];
+    let share = shares.triangle[in.triangle];
+    return contribution(triangle, share, point, here.xyz, params.delta, uncertainty(point, here.w));
 }
 
 // The corners of the volumes of a static world.

@@ -7,7 +7,8 @@
 // `last`    as `plain` to one output, whose sigmoid is the net's
 //
 // Of the others' sums Mish is stored, which is what everything after takes. A workgroup takes the outputs of a block for 8 x 8 x 8 voxels, an
-// invocation eight of these voxels, on top of each other, so that what is read of weights and of tensors serves several sums.
+// invocation eight of these voxels, on top of each other, so that a weight that is read serves eight sums, and seven of the eight voxels that are read
+// of a tile serve the next voxel of the kernel above as well.
 
 struct Conv3Params {
     // grid of what goes in
@@ -37,10 +38,7 @@ struct Weights {
     all: array<vec4<u32>>,
 }
 
-struct Grid {
-    all: array<f32>,
-}
-
+#include "shared/grid.wgsl"
 #include "shared/tile.wgsl"
 #include "shared/mish.wgsl"
 
@@ -58,61 +56,106 @@ const ENTRIES = CHANNELS;
 
 // Of an invocation's voxels, 8 outputs each.
 struct Sums {
-    a_low: vec4<f32>,
-    a_high: vec4<f32>,
-    b_low: vec4<f32>,
-    b_high: vec4<f32>,
-    c_low: vec4<f32>,
-    c_high: vec4<f32>,
-    d_low: vec4<f32>,
-    d_high: vec4<f32>,
-    e_low: vec4<f32>,
-    e_high: vec4<f32>,
-    f_low: vec4<f32>,
-    f_high: vec4<f32>,
-    g_low: vec4<f32>,
-    g_high: vec4<f32>,
-    h_low: vec4<f32>,
-    h_high: vec4<f32>,
+    a: Eight,
+    b: Eight,
+    c: Eight,
+    d: Eight,
+    e: Eight,
+    f: Eight,
+    g: Eight,
+    h: Eight,
 }
 
-const NOTHING = Sums(vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
+const ZERO = Eight(vec4(0.0), vec4(0.0));
+const NOTHING = Sums(ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO);
 
-// An input of all voxels, by its weights.
+// Of a tile, the eight voxels that an invocation's meet at one voxel of the kernel, as they are stored.
+struct Column {
+    a: vec4<u32>,
+    b: vec4<u32>,
+    c: vec4<u32>,
+    d: vec4<u32>,
+    e: vec4<u32>,
+    f: vec4<u32>,
+    g: vec4<u32>,
+    h: vec4<u32>,
+}
+
+fn column(at: u32) -> Column {
+    return Column(
+        tile[at + 0u * PLANE],
+        tile[at + 1u * PLANE],
+        tile[at + 2u * PLANE],
+        tile[at + 3u * PLANE],
+        tile[at + 4u * PLANE],
+        tile[at + 5u * PLANE],
+        tile[at + 6u * PLANE],
+        tile[at + 7u * PLANE],
+    );
+}
+
+// The one above, of which only the topmost voxel, in the tile at `top`, is not in a column.
+fn above(lower: Column, top: u32) -> Column {
+    return Column(lower.b, lower.c, lower.d, lower.e, lower.f, lower.g, lower.h, tile[top]);
+}
+
+// One input of a voxel.
+fn with_one(sum: Eight, x: f32, w: Eight) -> Eight {
+    return Eight(sum.low + x * w.low, sum.high + x * w.high);
+}
+
+// One input of all voxels, by its weights.
 fn with_input(sums: Sums, w: u32, x: vec4<f32>, y: vec4<f32>) -> Sums {
-    let both = unpacked(weights.all[w]);
-    let low = both.low;
-    let high = both.high;
+    let all = unpacked(weights.all[w]);
     return Sums(
-        sums.a_low + x.x * low,
-        sums.a_high + x.x * high,
-        sums.b_low + x.y * low,
-        sums.b_high + x.y * high,
-        sums.c_low + x.z * low,
-        sums.c_high + x.z * high,
-        sums.d_low + x.w * low,
-        sums.d_high + x.w * high,
-        sums.e_low + y.x * low,
-        sums.e_high + y.x * high,
-        sums.f_low + y.y * low,
-        sums.f_high + y.y * high,
-        sums.g_low + y.z * low,
-        sums.g_high + y.z * high,
-        sums.h_low + y.w * low,
-        sums.h_high + y.w * high,
+        with_one(sums.a, x.x, all),
+        with_one(sums.b, x.y, all),
+        with_one(sums.c, x.z, all),
+        with_one(sums.d, x.w, all),
+        with_one(sums.e, y.x, all),
+        with_one(sums.f, y.y, all),
+        with_one(sums.g, y.z, all),
+        with_one(sums.h, y.w, all),
+    );
+}
+
+// Two inputs of a voxel: a sum that is taken serves both.
+fn with_two(sum: Eight, x: vec2<f32>, p: Eight, q: Eight) -> Eight {
+    return with_one(with_one(sum, x.x, p), x.y, q);
+}
+
+// Two inputs of all voxels, by their weights.
+fn with_pair(sums: Sums, w: u32, a: vec2<f32>, b: vec2<f32>, c: vec2<f32>, d: vec2<f32>, e: vec2<f32>, f: vec2<f32>, g: vec2<f32>, h: vec2<f32>) -> Sums {
+    let p = unpacked(weights.all[w]);
+    let q = unpacked(weights.all[w + 1u]);
+    return Sums(
+        with_two(sums.a, a, p, q),
+        with_two(sums.b, b, p, q),
+        with_two(sums.c, c, p, q),
+        with_two(sums.d, d, p, q),
+        with_two(sums.e, e, p, q),
+        with_two(sums.f, f, p, q),
+        with_two(sums.g, g, p, q),
+        with_two(sums.h, h, p, q),
     );
 }
 
 // All inputs of a block of all voxels, by the weights of one voxel of the kernel.
-fn with_voxel(start: Sums, w: u32, a: Eight, b: Eight, c: Eight, d: Eight, e: Eight, f: Eight, g: Eight, h: Eight) -> Sums {
-    var sums = with_input(start, w, vec4(a.low.x, b.low.x, c.low.x, d.low.x), vec4(e.low.x, f.low.x, g.low.x, h.low.x));
-    sums = with_input(sums, w + 1u, vec4(a.low.y, b.low.y, c.low.y, d.low.y), vec4(e.low.y, f.low.y, g.low.y, h.low.y));
-    sums = with_input(sums, w + 2u, vec4(a.low.z, b.low.z, c.low.z, d.low.z), vec4(e.low.z, f.low.z, g.low.z, h.low.z));
-    sums = with_input(sums, w + 3u, vec4(a.low.w, b.low.w, c.low.w, d.low.w), vec4(e.low.w, f.low.w, g.low.w, h.low.w));
-    sums = with_input(sums, w + 4u, vec4(a.high.x, b.high.x, c.high.x, d.high.x), vec4(e.high.x, f.high.x, g.high.x, h.high.x));
-    sums = with_input(sums, w + 5u, vec4(a.high.y, b.high.y, c.high.y, d.high.y), vec4(e.high.y, f.high.y, g.high.y, h.high.y));
-    sums = with_input(sums, w + 6u, vec4(a.high.z, b.high.z, c.high.z, d.high.z), vec4(e.high.z, f.high.z, g.high.z, h.high.z));
-    return with_input(sums, w + 7u, vec4(a.high.w, b.high.w, c.high.w, d.high.w), vec4(e.high.w, f.high.w, g.high.w, h.high.w));
+fn with_voxel(start: Sums, w: u32, x: Column) -> Sums {
+    let a = unpacked(x.a);
+    let b = unpacked(x.b);
+    let c = unpacked(x.c);
+    let d = unpacked(x.d);
+    let e = unpacked(x.e);
+    let f = unpacked(x.f);
+    let g = unpacked(x.g);
+    let h = unpacked(x.h);
+    var sums = start;
+    sums = with_pair(sums, w, a.low.xy, b.low.xy, c.low.xy, d.low.xy, e.low.xy, f.low.xy, g.low.xy, h.low.xy);
+    sums = with_pair(sums, w + 2u, a.low.zw, b.low.zw, c.low.zw, d.low.zw, e.low.zw, f.low.zw, g.low.zw, h.low.zw);
+    sums = with_pair(sums, w + 4u, a.high.xy, b.high.xy, c.high.xy, d.high.xy, e.high.xy, f.high.xy, g.high.xy, h.high.xy);
+    sums = with_pair(sums, w + 6u, a.high.zw, b.high.zw, c.high.zw, d.high.zw, e.high.zw, f.high.zw, g.high.zw, h.high.zw);
+    return sums;
 }
 
 // Where an input block is, and its mean and deviation.
@@ -158,22 +201,22 @@ fn load_part(number: u32, corner: vec3<u32>, which: vec3<u32>, lane: u32) {
     }
 }
 
-fn store(place: vec3<u32>, dims: vec3<u32>, block: u32, low: vec4<f32>, high: vec4<f32>) {
+fn store(place: vec3<u32>, dims: vec3<u32>, block: u32, sums: Eight) {
     if all(place < dims) {
-        out.all[block * dims.x * dims.y * dims.z + voxel_at(place, dims)] = packed(Eight(mish(low), mish(high)));
+        out.all[block * dims.x * dims.y * dims.z + voxel_at(place, dims)] = packed(Eight(mish(sums.low), mish(sums.high)));
     }
 }
 
 // Those of all voxels, so many apart.
 fn store_all(place: vec3<u32>, apart: u32, dims: vec3<u32>, block: u32, sums: Sums) {
-    store(place, dims, block, sums.a_low, sums.a_high);
-    store(place + vec3(0u, 0u, 1u * apart), dims, block, sums.b_low, sums.b_high);
-    store(place + vec3(0u, 0u, 2u * apart), dims, block, sums.c_low, sums.c_high);
-    store(place + vec3(0u, 0u, 3u * apart), dims, block, sums.d_low, sums.d_high);
-    store(place + vec3(0u, 0u, 4u * apart), dims, block, sums.e_low, sums.e_high);
-    store(place + vec3(0u, 0u, 5u * apart), dims, block, sums.f_low, sums.f_high);
-    store(place + vec3(0u, 0u, 6u * apart), dims, block, sums.g_low, sums.g_high);
-    store(place + vec3(0u, 0u, 7u * apart), dims, block, sums.h_low, sums.h_high);
+    store(place, dims, block, sums.a);
+    store(place + vec3(0u, 0u, 1u * apart), dims, block, sums.b);
+    store(place + vec3(0u, 0u, 2u * apart), dims, block, sums.c);
+    store(place + vec3(0u, 0u, 3u * apart), dims, block, sums.d);
+    store(place + vec3(0u, 0u, 4u * apart), dims, block, sums.e);
+    store(place + vec3(0u, 0u, 5u * apart), dims, block, sums.f);
+    store(place + vec3(0u, 0u, 6u * apart), dims, block, sums.g);
+    store(place + vec3(0u, 0u, 7u * apart), dims, block, sums.h);
 }
 
 @compute @workgroup_size(TEAM)
@@ -188,17 +231,15 @@ fn plain(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
         load_block(block, corner, lane);
         workgroupBarrier();
         let w = (out_block * params.blocks + block) * 27u * ENTRIES;
-        for (var k = 0u; k < 27u; k++) {
-            let at = (here.z + k / 9u) * PLANE + (here.y + k / 3u % 3u) * ROW + here.x + k % 3u;
-            let x0 = unpacked(tile[at + 0u * PLANE]);
-            let x1 = unpacked(tile[at + 1u * PLANE]);
-            let x2 = unpacked(tile[at + 2u * PLANE]);
-            let x3 = unpacked(tile[at + 3u * PLANE]);
-            let x4 = unpacked(tile[at + 4u * PLANE]);
-            let x5 = unpacked(tile[at + 5u * PLANE]);
-            let x6 = unpacked(tile[at + 6u * PLANE]);
-            let x7 = unpacked(tile[at + 7u * PLANE]);
-            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3, x4, x5, x6, x7);
+        for (var k = 0u; k < 9u; k++) {
+            let at = (here.y + k / 3u) * ROW + here.x + k % 3u;
+            var x = column(at);
+            for (var z = 0u; z < 3u; z++) {
+                if z > 0u {
+                    x = above(x, at + (z + 7u) * PLANE);
+                }
+                sums = with_voxel(sums, w + (9u * z + k) * ENTRIES, x);
+            }
         }
     }
     store_all(corner + here, 1u, params.dims, out_block, sums);
@@ -220,17 +261,15 @@ fn doubled(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_in
         load_part(block, corner, which, lane);
         workgroupBarrier();
         let w = ((out_block * params.blocks + block) * 8u + child) * 8u * ENTRIES;
-        for (var k = 0u; k < 8u; k++) {
-            let at = (first.z + k / 4u) * PLANE + (first.y + k / 2u % 2u) * ROW + first.x + k % 2u;
-            let x0 = unpacked(tile[at + 0u * PLANE]);
-            let x1 = unpacked(tile[at + 1u * PLANE]);
-            let x2 = unpacked(tile[at + 2u * PLANE]);
-            let x3 = unpacked(tile[at + 3u * PLANE]);
-            let x4 = unpacked(tile[at + 4u * PLANE]);
-            let x5 = unpacked(tile[at + 5u * PLANE]);
-            let x6 = unpacked(tile[at + 6u * PLANE]);
-            let x7 = unpacked(tile[at + 7u * PLANE]);
-            sums = with_voxel(sums, w + k * ENTRIES, x0, x1, x2, x3, x4, x5, x6, x7);
+        for (var k = 0u; k < 4u; k++) {
+            let at = first.z * PLANE + (first.y + k / 2u) * ROW + first.x + k % 2u;
+            var x = column(at);
+            for (var z = 0u; z < 2u; z++) {
+                if z > 0u {
+                    x = above(x, at + (z + 7u) * PLANE);
+                }
+                sums = with_voxel(sums, w + (4u * z + k) * ENTRIES, x);
+            }
         }
     }
     let fine = 2u * (corner + here) + which;
@@ -263,13 +302,14 @@ fn first(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_inde
     store_all(here, 1u, params.dims, out_block, sums);
 }
 
-// One output of an invocation's voxels.
-fn with_eight(sums: vec4<f32>, w: u32, a: Eight, b: Eight, c: Eight, d: Eight) -> vec4<f32> {
-    let both = unpacked(weights.all[w]);
-    let low = both.low;
-    let high = both.high;
-    return sums + vec4(dot(a.low, low), dot(b.low, low), dot(c.low, low), dot(d.low, low))
-        + vec4(dot(a.high, high), dot(b.high, high), dot(c.high, high), dot(d.high, high));
+// What a block's inputs of a voxel add to the one output.
+fn of_one(w: Eight, words: vec4<u32>) -> f32 {
+    let x = unpacked(words);
+    return dot(x.low, w.low) + dot(x.high, w.high);
+}
+
+fn of_four(w: Eight, a: vec4<u32>, b: vec4<u32>, c: vec4<u32>, d: vec4<u32>) -> vec4<f32> {
+    return vec4(of_one(w, a), of_one(w, b), of_one(w, c), of_one(w, d));
 }
 
 fn give(place: vec3<u32>, sum: f32) {
@@ -284,32 +324,31 @@ fn last(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     let corner = corner_of(params.base + group.x);
     let here = place_of(lane);
     var sums = vec4(0.0);
-    var above = vec4(0.0);
+    var upper = vec4(0.0);
     for (var block = 0u; block < params.blocks; block++) {
         workgroupBarrier();
         load_block(block, corner, lane);
         workgroupBarrier();
         let w = block * 27u;
-        for (var k = 0u; k < 27u; k++) {
-            let at = (here.z + k / 9u) * PLANE + (here.y + k / 3u % 3u) * ROW + here.x + k % 3u;
-            let x0 = unpacked(tile[at + 0u * PLANE]);
-            let x1 = unpacked(tile[at + 1u * PLANE]);
-            let x2 = unpacked(tile[at + 2u * PLANE]);
-            let x3 = unpacked(tile[at + 3u * PLANE]);
-            let x4 = unpacked(tile[at + 4u * PLANE]);
-            let x5 = unpacked(tile[at + 5u * PLANE]);
-            let x6 = unpacked(tile[at + 6u * PLANE]);
-            let x7 = unpacked(tile[at + 7u * PLANE]);
-            sums = with_eight(sums, w + k, x0, x1, x2, x3);
-            above = with_eight(above, w + k, x4, x5, x6, x7);
+        for (var k = 0u; k < 9u; k++) {
+            let at = (here.y + k / 3u) * ROW + here.x + k % 3u;
+            var x = column(at);
+            for (var z = 0u; z < 3u; z++) {
+                if z > 0u {
+                    x = above(x, at + (z + 7u) * PLANE);
+                }
+                let both = unpacked(weights.all[w + 9u * z + k]);
+                sums += of_four(both, x.a, x.b, x.c, x.d);
+                upper += of_four(both, x.e, x.f, x.g, x.h);
+            }
         }
     }
     give(corner + here, sums.x);
     give(corner + here + vec3(0u, 0u, 1u), sums.y);
     give(corner + here + vec3(0u, 0u, 2u), sums.z);
     give(corner + here + vec3(0u, 0u, 3u), sums.w);
-    give(corner + here + vec3(0u, 0u, 4u), above.x);
-    give(corner + here + vec3(0u, 0u, 5u), above.y);
-    give(corner + here + vec3(0u, 0u, 6u), above.z);
-    give(corner + here + vec3(0u, 0u, 7u), above.w);
+    give(corner + here + vec3(0u, 0u, 4u), upper.x);
+    give(corner + here + vec3(0u, 0u, 5u), upper.y);
+    give(corner + here + vec3(0u, 0u, 6u), upper.z);
+    give(corner + here + vec3(0u, 0u, 7u), upper.w);
 }

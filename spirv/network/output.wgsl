@@ -17,11 +17,8 @@ struct OutputParams {
     voxel: vec3<f32>,
 }
 
+#include "shared/grid.wgsl"
 #include "shared/listed.wgsl"
-
-struct Grid {
-    all: array<f32>,
-}
 
 var<immediate> params: OutputParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;

@@ -18,11 +18,8 @@ struct ResizeParams {
     before: vec3<i32>,
 }
 
+#include "shared/grid.wgsl"
 #include "shared/tensors.wgsl"
-
-struct Grid {
-    all: array<f32>,
-}
 
 var<immediate> params: ResizeParams;
 @group(0) @binding(0) var opacity: texture_3d<f32>;

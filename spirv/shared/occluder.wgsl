@@ -1,5 +1,7 @@
 // Ambient occlusion of a point by a triangle, exactly (AOV section 4), and its falloff (section 5.1).
 //
+// alpha is the share of the triangle that is there: where masks and clips leave a part, it is taken to be spread over all of it (section 5.3).
+//
 //   AO = -1/2pi sum_i theta_i n.m_i    m_i = S(p_i x p_j), theta_i the angle between p_i and p_j, over the polygon that n.p >= 0 leaves
 //   g  = alpha prod_{i=0..k} clamp(1 - p_i.m_i / delta, 0, 1)    m_i the inward normals of the edges, m_k = -(normal of the face), p_k = p_0
 //
@@ -65,11 +67,15 @@ fn occlusion_by(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, normal: vec3<f32>) -> 
 // in mm, what lies there is taken for the face itself.
 fn contribution(
     triangle: WorldTriangle,
+    share: f32,
     point: vec3<f32>,
     normal: vec3<f32>,
     delta: f32,
     nothing: f32,
 ) -> f32 {
+    if share <= 0.0 {
+        return 0.0;
+    }
     let kind = u32(triangle.c.w);
     let a = triangle.a.xyz - point;
     var b = triangle.b.xyz - point;
@@ -100,7 +106,7 @@ fn contribution(
     if falloff <= 0.0 || ((kind & SLIVER) != 0u && !in_box(a, b, c, face, delta)) {
         return 0.0;
     }
-    return triangle.a.w * falloff * occlusion_by(a, b, c, normal);
+    return share * falloff * occlusion_by(a, b, c, normal);
 }
 
 // Whether the point is over the box of a triangle in its plane, along its longest edge, grown by delta.

@@ -1,6 +1,8 @@
-// Rays through the world. Kernels bind `tree` over the triangles' boxes, `triangles`, and what `surface.wgsl` asks for.
+// Rays through the world, which pass what clips hide. Kernels bind `tree` over the triangles' boxes, `triangles`, `clips`, `layers`, and what
+// `surface.wgsl` asks for.
 
 #include "shared/surface.wgsl"
+#include "shared/clips.wgsl"
 
 struct Hit {
     // way along the ray, in its direction's lengths
@@ -62,7 +64,8 @@ fn first_hit(origin: vec3<f32>, direction: vec3<f32>, begin: f32, end: f32) -> H
         for (var k = 0u; k < leaf_count(node); k++) {
             let triangle = triangles.triangle[first + k];
             let at = hit_of(triangle, origin, direction);
-            if at.x > begin && at.x < hit.t && is_there(first + k, triangle, at.yz) {
+            let passes = at.x > begin && at.x < hit.t;
+            if passes && is_there(first + k, triangle, at.yz) && visible(origin + at.x * direction) {
                 hit = Hit(at.x, first + k, at.yz);
             }
         }

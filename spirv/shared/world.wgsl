@@ -31,6 +31,11 @@ const TWO_SIDED = 2u;
 // Whose volume is cut by the box of the triangle: corners are so sharp that it would reach far.
 const SLIVER = 4u;
 
+// What is left of each triangle, of its area: what neither its mask nor a clip takes.
+struct Shares {
+    triangle: array<f32>,
+}
+
 struct Triangles {
     triangle: array<WorldTriangle>,
 }

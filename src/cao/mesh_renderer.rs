@@ -19,8 +19,10 @@ use crate::mesh::surfaces::Surfaces;
 use crate::renderer::{Renderer, StereoImage};
 use crate::{Error, Result, stages};
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timing, Timings};
+use cao_model::clip::Clip;
 use cao_model::look::Look;
 use cao_model::pixel_occlusion::{PixelMethod, PixelOcclusion};
+use cao_model::settings::MapSettings;
 use cao_model::surface::World;
 use cao_model::view::View;
 
@@ -75,6 +77,15 @@ impl MeshRenderer {
             light: Light::new(gpu)?,
             frame: None,
         })
+    }
+
+    /// Cuts the world by other clips: what they hide is neither seen nor occludes. Surfaces that are cut open show their backs. Uses the device's queue and
+    /// waits for it; pictures that are recorded already must have run.
+    ///
+    /// # Errors
+    /// More than [`Clip::MAX`], impossible poses, clip meshes that bound no solid: then the clips before stay.
+    pub fn set_clips(&mut self, clips: &[Clip]) -> Result<()> {
+        self.surfaces.set_clips(&self.gpu, clips, MapSettings::default())
     }
 
     /// How far occlusion reaches, in mm.
@@ -197,7 +208,7 @@ impl MeshRenderer {
             rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         }
         rec.stage(stages::LIGHT)?;
-        self.light.record(rec, lit, views, look, picture, volume.is_some())?;
+        self.light.record(rec, lit, views, look, picture, volume.map(Renderer::shade))?;
         rec.end_stage()?;
         rec.barrier(
             &[Access::StorageWrite],

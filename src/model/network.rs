@@ -64,9 +64,34 @@ impl Label {
     }
 }
 
+/// What a convolution takes and gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Takes the grid.
+    First,
+    /// Takes one tensor.
+    Plain,
+    /// Takes two tensors beside each other, doubled.
+    Doubled,
+    /// Takes two tensors beside each other and gives the grid.
+    Last,
+}
+
+impl Form {
+    /// Tensors that go in, the grid being one; each has the same number of channels.
+    pub fn tensors(self) -> u32 {
+        match self {
+            Self::First | Self::Plain => 1,
+            Self::Doubled | Self::Last => 2,
+        }
+    }
+}
+
 /// A convolution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layer {
+    /// What it takes and gives.
+    pub form: Form,
     /// Its name in weight files: `first`, `encoder.2.1`, `middle`, `decoder.0.0`, `last`.
     pub name: String,
     /// The level of what it gives.
@@ -131,27 +156,29 @@ impl Shape {
         let (last, c) = (self.levels, |level| self.channels(level));
         // Of a single voxel there is no variance.
         let normalised = |level: u32| self.edge >> level > 1;
-        let layer = |name: String, level, inputs, outputs, normalised| Layer {
+        let layer = |form, name: String, level, inputs, outputs, normalised| Layer {
+            form,
             name,
             level,
             inputs,
             outputs,
             normalised,
         };
-        let mut layers = vec![layer("first".into(), 0, 1, c(0), false)];
+        let mut layers = vec![layer(Form::First, "first".into(), 0, 1, c(0), false)];
         for i in 0..last {
             let level = i + 1;
-            let of =
-                |k: u32, outputs| layer(format!("encoder.{i}.{k}"), level, c(i), outputs, normalised(level));
+            let of = |k: u32, outputs| {
+                layer(Form::Plain, format!("encoder.{i}.{k}"), level, c(i), outputs, normalised(level))
+            };
             layers.extend([of(0, c(i)), of(1, c(level))]);
         }
-        layers.push(layer("middle".into(), last, c(last), c(last), normalised(last)));
+        layers.push(layer(Form::Plain, "middle".into(), last, c(last), c(last), normalised(last)));
         for i in 0..last {
             let (from, level) = (last - i, last - i - 1);
-            layers.push(layer(format!("decoder.{i}.0"), level, 2 * c(from), c(from), true));
-            layers.push(layer(format!("decoder.{i}.1"), level, c(from), c(level), true));
+            layers.push(layer(Form::Doubled, format!("decoder.{i}.0"), level, 2 * c(from), c(from), true));
+            layers.push(layer(Form::Plain, format!("decoder.{i}.1"), level, c(from), c(level), true));
         }
-        layers.push(layer("last".into(), 0, 2 * c(0), 1, true));
+        layers.push(layer(Form::Last, "last".into(), 0, 2 * c(0), 1, true));
         layers
     }
 

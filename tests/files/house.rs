@@ -339,7 +339,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/cao/field/", &["error", "host", "drive"]),
     ("src/cao/clip/", &["error", "host", "stages", "field"]),
     ("src/cao/draw/", &["error", "host", "field", "clip"]),
-    ("src/cao/mesh/", &["error", "host", "stages", "drive", "draw"]),
+    ("src/cao/mesh/", &["error", "host", "stages", "drive", "draw", "clip"]),
     (
         "src/cao/mesh_renderer.rs",
         &["draw", "drive", "error", "host", "image_space", "mesh", "renderer", "stages"],

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 
 /// Cases of the test with files near valid ones: under two seconds.
-const CASES: u32 = 300;
+const CASES: u32 = 200;
 
 /// A PNG of these pixels.
 pub fn png(
@@ -242,6 +242,16 @@ fn wrong_obj_files_are_refused_with_file_and_line() {
     }
     let said = refusal(&[("a.stl", b"solid")]);
     assert!(said.ends_with("a.stl: name: is no mesh that is read; expected .obj, .gltf or .glb, or another format converted to it"), "{said}");
+    for name in ["a.obj", "a.gltf", "a.glb"] {
+        let folder = folder(&[]);
+        let long = folder.path().join(name);
+        fs::File::create(&long).unwrap().set_len((256 << 20) + 1).unwrap();
+        let said = load(&long).unwrap_err().to_string();
+        assert!(
+            said.ends_with(&format!("{name}: size: 268435457 bytes, expected at most 268435456")),
+            "{said}"
+        );
+    }
     let missing = load(Path::new("nowhere.obj")).unwrap_err();
     assert!(matches!(missing, cao_formats::Error::Io { .. }), "{missing}");
 }

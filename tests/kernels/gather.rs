@@ -37,7 +37,7 @@ fn every_pixel_is_as_the_twin_has_it() {
         let found = sums_of(&gpu, &pixels, delta);
         let (mut other, mut all, mut darkest) = (0, 0, 1.0f64);
         for (view, eye) in views.iter().enumerate() {
-            for (i, shown) in gbuffer(&world, eye, SIZE).into_iter().enumerate() {
+            for (i, shown) in gbuffer(&world, &[], eye, SIZE).into_iter().enumerate() {
                 let found = f64::from(found[view * (SIZE[0] * SIZE[1]) as usize + i]);
                 let occlusion = shown.map_or(0.0, |s| gathered(&world, s.place, s.normal, f64::from(delta)));
                 let expected = 1.0 - occlusion.min(1.0);

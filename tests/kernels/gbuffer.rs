@@ -1,6 +1,10 @@
 //! The kernel `gbuffer` against its twin.
 
-use cao_testing::worlds::{Pixels, corner, corner_eyes, floats};
+use cao_gpu::Gpu;
+use cao_model::clip::Clip;
+use cao_model::surface::World;
+use cao_model::view::View;
+use cao_testing::worlds::{self, Pixels, corner, corner_eyes, floats};
 use cao_testing::*;
 use cao_twin::mesh::gbuffer::gbuffer;
 use std::collections::HashSet;
@@ -18,12 +22,24 @@ const DEPTH: f64 = 2e-5;
 fn both_eyes_show_what_the_twin_does() {
     let gpu = open();
     let (world, views) = (corner(), corner_eyes(SIZE));
-    let pixels = Pixels::new(&gpu, &world, &views, SIZE);
-    let geometry = floats(&gpu, &pixels.geometry.pixels);
-    let hits: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &pixels.hits));
+    let mut worlds = Vec::new();
+    for clips in [vec![], worlds::clips()] {
+        let pixels = Pixels::clipped(&gpu, &world, &clips, &views, SIZE);
+        let seen = compared(&gpu, &world, &clips, &views, &pixels);
+        worlds.push((seen, floats(&gpu, &pixels.geometry.pixels)));
+    }
+    assert_eq!(worlds[0].0, 6, "every surface is to be seen, the needle too");
+    assert_ne!(worlds[0].1, worlds[1].1, "clips change nothing");
+    close(gpu);
+}
+
+/// Compares what pixels show with the twin; how many surfaces are seen.
+fn compared(gpu: &Gpu, world: &World, clips: &[Clip], views: &[View], pixels: &Pixels) -> usize {
+    let geometry = floats(gpu, &pixels.geometry.pixels);
+    let hits: Vec<[u32; 2]> = bytemuck::pod_collect_to_vec(&read_buffer(gpu, &pixels.hits));
     let (mut other, mut all, mut seen) = (0, 0, HashSet::new());
     for (view, eye) in views.iter().enumerate() {
-        for (i, expected) in gbuffer(&world, eye, SIZE).into_iter().enumerate() {
+        for (i, expected) in gbuffer(world, clips, eye, SIZE).into_iter().enumerate() {
             let at = view * (SIZE[0] * SIZE[1]) as usize + i;
             let pixel = &geometry[4 * at..4 * at + 4];
             all += 1;
@@ -49,7 +65,5 @@ fn both_eyes_show_what_the_twin_does() {
         }
     }
     assert!(f64::from(other) < OTHER * f64::from(all), "{other} of {all}");
-    assert_eq!(seen.len(), 6, "every surface is to be seen, the needle too");
-    drop(pixels);
-    close(gpu);
+    seen.len()
 }

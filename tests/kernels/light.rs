@@ -1,13 +1,15 @@
 //! The kernel `light` against its twin, alone and behind a picture.
 
 use cao::draw::picture::Picture;
-use cao::mesh::light::{Light, Lit};
-use cao_gpu::Access;
+use cao::field::volume_of;
+use cao::mesh::light::{Light, Lit, VolumeShade};
+use cao_gpu::{Access, Format};
 use cao_model::look::{Look, Occluded};
 use cao_testing::worlds::{Pixels, corner, corner_eyes, layers};
-use cao_testing::*;
+use cao_testing::{close, open, run, write_image};
 use cao_twin::mesh::gbuffer::gbuffer;
 use cao_twin::mesh::light::lit;
+use glam::DVec3;
 
 const SIZE: [u32; 2] = [45, 35];
 
@@ -34,13 +36,20 @@ fn pictures_are_lit_as_the_twin_lights_them() {
         hits: &pixels.hits,
         accessibility: &accessibility,
     };
+    // A volume around half of the room, of factors from 0 to 1 along x.
+    let dims = [8, 4, 4];
+    let factor = |x: usize| x as f32 / 7.0;
+    let texels: Vec<f32> = (0..128).map(|i| factor(i % 8)).collect();
+    let ambient = volume_of(&gpu, "ambient", dims, Format::R32Float).unwrap();
+    write_image(&gpu, &ambient, bytemuck::cast_slice(&texels));
+    let shade = VolumeShade { ambient: &ambient, coloured: false, spacing: [20.0, 50.0, 50.0] };
     for occluded in [Occluded::Ambient, Occluded::All] {
         let look = Look { occluded, two_sided: true, ..Look::default() };
         run(&gpu, |rec| {
             rec.discard(&picture.colour);
             rec.discard(&picture.depth);
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead]);
-            light.record(rec, scene, &views, &look, &picture, false).unwrap();
+            light.record(rec, scene, &views, &look, &picture, None).unwrap();
         });
         let (colours, depths) = (layers(&gpu, &picture.colour), layers(&gpu, &picture.depth));
         // Laid over what is there, which covers three quarters.
@@ -48,13 +57,13 @@ fn pictures_are_lit_as_the_twin_lights_them() {
             rec.barrier(&[Access::TransferRead], &[Access::TransferWrite]);
             rec.clear_image(&picture.colour, [0.1, 0.2, 0.3, 0.75]).unwrap();
             rec.barrier(&[Access::TransferWrite], &[Access::StorageRead, Access::StorageWrite]);
-            light.record(rec, scene, &views, &look, &picture, true).unwrap();
+            light.record(rec, scene, &views, &look, &picture, Some(shade)).unwrap();
         });
         let over = layers(&gpu, &picture.colour);
         let towards = look.towards_light(views[0].orientation).as_dvec3();
         let mut other = 0;
         for (view, eye) in views.iter().enumerate() {
-            for (i, shown) in gbuffer(&world, eye, SIZE).iter().enumerate() {
+            for (i, shown) in gbuffer(&world, &[], eye, SIZE).iter().enumerate() {
                 let at = view * count / 2 + i;
                 let (alone, behind) = (&colours[4 * at..4 * at + 4], &over[4 * at..4 * at + 4]);
                 let Some(shown) = shown else {
@@ -63,18 +72,23 @@ fn pictures_are_lit_as_the_twin_lights_them() {
                     continue;
                 };
                 let position = eye.position.as_dvec3();
-                let expected = lit(&world, shown, f64::from(open_at(at)), &look, towards, position);
+                let open = f64::from(open_at(at));
+                let expected = lit(&world, shown, open, &look, towards, position);
+                let air = shown.place + 20.0 * shown.normal;
+                let inside = (air / DVec3::new(80.0, 100.0, 100.0)).abs().max_element() <= 1.0;
+                let factor = if inside { ((air.x / 20.0 + 3.5) / 7.0).clamp(0.0, 1.0) } else { 1.0 };
+                let shaded = lit(&world, shown, open * factor, &look, towards, position);
                 let [a, b] = eye.depth_terms().map(f64::from);
                 let wrong = |found: f32, expected: f64| (f64::from(found) - expected).abs() > ERROR;
                 let front = [0.1, 0.2, 0.3];
                 let any = (0..3)
-                    .any(|k| wrong(alone[k], expected[k]) || wrong(behind[k], front[k] + 0.25 * expected[k]));
+                    .any(|k| wrong(alone[k], expected[k]) || wrong(behind[k], front[k] + 0.25 * shaded[k]));
                 other += u32::from(any || wrong(depths[at], a + b / shown.hit.t));
                 assert_eq!((alone[3], behind[3]), (1.0, 1.0));
             }
         }
         assert!(f64::from(other) < OTHER * count as f64, "{occluded:?}: {other} of {count}");
     }
-    drop((pixels, picture, accessibility));
+    drop((pixels, picture, accessibility, ambient));
     close(gpu);
 }

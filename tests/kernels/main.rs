@@ -46,6 +46,7 @@ mod rays;
 mod reference;
 mod resize;
 mod shading;
+mod shares;
 mod ssao;
 mod sums;
 mod tiles;

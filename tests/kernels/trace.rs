@@ -1,7 +1,7 @@
 //! The kernel `trace` against its twin, and in pieces.
 
 use cao::mesh::trace::Trace;
-use cao_testing::worlds::{Pixels, corner, corner_eyes, floats};
+use cao_testing::worlds::{Pixels, clips, corner, corner_eyes, floats};
 use cao_testing::*;
 use cao_twin::mesh::gbuffer::gbuffer;
 use cao_twin::mesh::trace::traced;
@@ -20,8 +20,8 @@ const MEAN: f64 = 0.01;
 #[test]
 fn rays_give_what_the_twin_integrates() {
     let gpu = open();
-    let (world, views) = (corner(), corner_eyes(SIZE));
-    let pixels = Pixels::new(&gpu, &world, &views, SIZE);
+    let (world, views, clips) = (corner(), corner_eyes(SIZE), &clips()[..1]);
+    let pixels = Pixels::clipped(&gpu, &world, clips, &views, SIZE);
     let (trace, accessibility) = (Trace::new(&gpu).unwrap(), pixels.values(&gpu));
     let run = |all: u32, to| {
         let mut progress = Vec::new();
@@ -33,13 +33,13 @@ fn rays_give_what_the_twin_integrates() {
     let found = floats(&gpu, &accessibility);
     let (mut sum, mut bias, mut count) = (0.0, 0.0, 0.0);
     for (view, eye) in views.iter().enumerate() {
-        for (i, shown) in gbuffer(&world, eye, SIZE).into_iter().enumerate().step_by(EVERY) {
+        for (i, shown) in gbuffer(&world, clips, eye, SIZE).into_iter().enumerate().step_by(EVERY) {
             let found = f64::from(found[view * (SIZE[0] * SIZE[1]) as usize + i]);
             let Some(shown) = shown else {
                 assert_eq!(found, 1.0);
                 continue;
             };
-            let expected = 1.0 - traced(&world, shown.place, shown.normal, f64::from(DELTA), EDGE);
+            let expected = 1.0 - traced(&world, clips, shown.place, shown.normal, f64::from(DELTA), EDGE);
             (sum, bias, count) = (sum + (found - expected).abs(), bias + found - expected, count + 1.0);
         }
     }

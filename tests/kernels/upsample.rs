@@ -28,7 +28,7 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
     let every = pixels.values(&gpu);
     run(&gpu, |rec| gather.record_full(rec, scene, 0..SIZE[1], &every).unwrap());
     let full = floats(&gpu, &every);
-    let shown = views.map(|view| gbuffer(&world, &view, SIZE));
+    let shown = views.map(|view| gbuffer(&world, &[], &view, SIZE));
     let mut failures = Vec::new();
     for step in [3, 5, 15] {
         let blocks = Blocks::new(&gpu, &pixels.geometry, step).unwrap();

@@ -4,7 +4,8 @@ use cao::mesh::gbuffer::Gbuffer;
 use cao::mesh::geometry::Geometry;
 use cao::mesh::surfaces::Surfaces;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image};
-use cao_model::clip::Pose;
+use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::settings::MapSettings;
 use cao_model::surface::{Instance, Material, Surface, Texture, World};
 use cao_model::view::{StereoRig, View};
 use glam::{Vec2, Vec3};
@@ -78,6 +79,21 @@ pub fn corner() -> World {
     ])
 }
 
+/// A ball out of the box, and what is beyond a plane.
+pub fn clips() -> Vec<Clip> {
+    let ball =
+        Pose { translate_mm: Vec3::new(75.0, 55.0, 30.0), scale: Vec3::splat(18.0), ..Pose::default() };
+    let plane = Pose {
+        translate_mm: Vec3::new(20.0, 0.0, 0.0),
+        rotate_deg: Vec3::new(0.0, 80.0, 0.0),
+        ..Pose::default()
+    };
+    vec![
+        Clip { pose: ball, ..Clip::remove(Shape::Sphere) },
+        Clip { pose: plane, mode: Mode::Keep, shape: Shape::Plane },
+    ]
+}
+
 /// Both eyes that look into the corner.
 pub fn corner_eyes(size: [u32; 2]) -> [View; 2] {
     let rig = StereoRig {
@@ -104,7 +120,13 @@ pub struct Pixels {
 impl Pixels {
     /// Drawn.
     pub fn new(gpu: &Gpu, world: &World, views: &[View], size: [u32; 2]) -> Self {
-        let surfaces = Surfaces::new(gpu, world).unwrap();
+        Self::clipped(gpu, world, &[], views, size)
+    }
+
+    /// Drawn, cut by clips.
+    pub fn clipped(gpu: &Gpu, world: &World, clips: &[Clip], views: &[View], size: [u32; 2]) -> Self {
+        let mut surfaces = Surfaces::new(gpu, world).unwrap();
+        surfaces.set_clips(gpu, clips, MapSettings::default()).unwrap();
         let geometry = Geometry::new(gpu, size, views.len()).unwrap();
         let bytes = Gbuffer::HIT * geometry.pixels.bytes() / Geometry::BYTES;
         let hits = gpu.buffer("hits", bytes, BufferUse::Device).unwrap();

@@ -79,6 +79,7 @@ impl Gather {
             eyes: &geometry.eyes,
             tree: &volumes.tree,
             triangles: &surfaces.triangles,
+            shares: &surfaces.shares,
             geometry: &geometry.pixels,
             accessibility,
         };
@@ -98,6 +99,7 @@ impl Gather {
             eyes: &geometry.eyes,
             tree: &volumes.tree,
             triangles: &surfaces.triangles,
+            shares: &surfaces.shares,
             geometry: &geometry.pixels,
             sparse_sums: &blocks.sums,
         };
@@ -113,6 +115,7 @@ impl Gather {
             eyes: &geometry.eyes,
             tree: &volumes.tree,
             triangles: &surfaces.triangles,
+            shares: &surfaces.shares,
             geometry: &geometry.pixels,
             accessibility,
         };

@@ -37,6 +37,8 @@ impl Gbuffer {
             looks: &surfaces.looks,
             materials: &surfaces.materials,
             texels: &surfaces.texels,
+            clips: &surfaces.clips.clips,
+            layers: &surfaces.clips.layers,
             geometry: &geometry.pixels,
             hits,
         };

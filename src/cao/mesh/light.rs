@@ -6,7 +6,7 @@ use crate::Result;
 use crate::draw::picture::Picture;
 use crate::mesh::geometry::Geometry;
 use crate::mesh::surfaces::Surfaces;
-use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
+use cao_gpu::{Buffer, Format, Gpu, Image, Pipeline, Recorder, Sampler, SamplerDesc};
 use cao_kernels::light as kernel;
 use cao_model::look::{Look, Occluded};
 use cao_model::view::View;
@@ -16,6 +16,18 @@ pub struct Light {
     alone: Pipeline,
     ends: Pipeline,
     over: Pipeline,
+    edge: Sampler,
+}
+
+/// The ambient values of a volume, whose centre is the world's origin.
+#[derive(Clone, Copy)]
+pub struct VolumeShade<'a> {
+    /// V_AO.
+    pub ambient: &'a Image,
+    /// Whether it is of coloured light.
+    pub coloured: bool,
+    /// Size of a voxel in mm.
+    pub spacing: [f32; 3],
 }
 
 /// What is lit.
@@ -35,7 +47,12 @@ impl Light {
     /// Builds the pipelines.
     pub fn new(gpu: &Gpu) -> Result<Self> {
         let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
-        Ok(Self { alone: pipeline("alone")?, ends: pipeline("ends")?, over: pipeline("over")? })
+        Ok(Self {
+            alone: pipeline("alone")?,
+            ends: pipeline("ends")?,
+            over: pipeline("over")?,
+            edge: gpu.sampler("edge", SamplerDesc { linear: true, border_zero: false })?,
+        })
     }
 
     /// Writes where a volume's rays end into a picture's depth.
@@ -47,7 +64,7 @@ impl Light {
         Ok(rec.dispatch_over(&self.ends, &binds, bytemuck::bytes_of(&params), over)?)
     }
 
-    /// Writes colour and depth of a picture, or lays what is there over the world. The light is that of the first view's head.
+    /// Writes colour and depth of a picture, or lays what is there of a volume over the world. The light is that of the first view's head.
     pub fn record(
         &self,
         rec: &mut Recorder,
@@ -55,14 +72,14 @@ impl Light {
         views: &[View],
         look: &Look,
         picture: &Picture,
-        over_world: bool,
+        volume: Option<VolumeShade>,
     ) -> Result<()> {
         let Lit { surfaces, geometry, hits, accessibility } = lit;
         let [width, height] = geometry.size();
         let flag = |on| f32::from(u8::from(on));
         let [ambient, diffuse, specular] = look.parts();
         let light = look.towards_light(views[0].orientation);
-        let params = kernel::LightParams {
+        let mut params = kernel::LightParams {
             size: [width, height],
             ambient,
             diffuse,
@@ -74,10 +91,18 @@ impl Light {
             light_x: light.x,
             light_y: light.y,
             light_z: light.z,
+            ..bytemuck::Zeroable::zeroed()
         };
         let extent = [width, height, geometry.views() as u32];
-        let push = bytemuck::bytes_of(&params);
-        if over_world {
+        if let Some(VolumeShade { ambient, coloured, spacing }) = volume {
+            let dims = ambient.desc().dims.map(|voxels| voxels as f32);
+            [params.dims_x, params.dims_y, params.dims_z] = dims;
+            [params.spacing_x, params.spacing_y, params.spacing_z] = spacing;
+            params.texels = match (ambient.desc().format, coloured) {
+                (_, true) => kernel::COLOURED,
+                (Format::Rgba16Unorm, false) => kernel::PARTS_OF_FOUR,
+                _ => kernel::GREY,
+            };
             let binds = kernel::OverBindings {
                 eyes: &geometry.eyes,
                 looks: &surfaces.looks,
@@ -89,8 +114,10 @@ impl Light {
                 accessibility,
                 colours: &picture.colour,
                 depths: &picture.depth,
+                ambient,
+                edge: &self.edge,
             };
-            return Ok(rec.dispatch_over(&self.over, &binds, push, extent)?);
+            return Ok(rec.dispatch_over(&self.over, &binds, bytemuck::bytes_of(&params), extent)?);
         }
         let binds = kernel::AloneBindings {
             eyes: &geometry.eyes,
@@ -104,6 +131,6 @@ impl Light {
             colours: &picture.colour,
             depths: &picture.depth,
         };
-        Ok(rec.dispatch_over(&self.alone, &binds, push, extent)?)
+        Ok(rec.dispatch_over(&self.alone, &binds, bytemuck::bytes_of(&params), extent)?)
     }
 }

@@ -5,6 +5,7 @@ pub mod gather;
 pub mod gbuffer;
 pub mod geometry;
 pub mod light;
+pub mod shares;
 pub mod surfaces;
 pub mod trace;
 pub mod upsample;

@@ -2,12 +2,18 @@
 //!
 //! 48 bytes a triangle for its corners, 36 for its look, some 24 for the tree; 4 a texel.
 
+use crate::clip::clips::ClipSet;
+use crate::clip::dilate::Dilate;
+use crate::clip::peel::Peel;
 use crate::host::device_buffer;
+use crate::mesh::shares::Shares;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use cao_gpu::{Buffer, Gpu};
+use cao_gpu::{Access, Buffer, Gpu};
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
+use cao_model::clip::Clip;
+use cao_model::settings::MapSettings;
 use cao_model::surface::{Triangle, World, bounds_of};
 use glam::Vec3;
 
@@ -23,11 +29,17 @@ pub struct Surfaces {
     pub materials: Buffer,
     /// Bound as `texels`.
     pub texels: Buffer,
+    /// Bound as `shares`: what clips and masks leave of each triangle.
+    pub shares: Buffer,
+    /// The clips.
+    pub clips: ClipSet,
     /// The triangles as they lie there,
     pub ordered: Vec<Triangle>,
     /// and whether their backs are surfaces too.
     pub two_sided: Vec<bool>,
     nodes: Vec<Node>,
+    /// Half the diagonal of a box about the origin that holds them all.
+    half_mm: f32,
 }
 
 /// The boxes of what triangles may occlude, in the tree of the triangles.
@@ -71,7 +83,17 @@ impl Surfaces {
         }
         let triangles: Vec<_> = ordered.iter().map(|t| on_device(t, world)).collect();
         let looks: Vec<_> = ordered.iter().map(look_of).collect();
+        let (low, high) = world.bounds();
+        let half_mm = low.abs().max(high.abs()).length();
+        let clips = ClipSet::new(gpu)?;
+        let mut rec = gpu.recorder("no clips")?;
+        clips.record(&mut rec, &[], half_mm)?;
+        rec.submit_and_wait()?;
+        let whole: Vec<f32> = ordered.iter().map(|triangle| triangle.opacity).collect();
         Ok(Self {
+            shares: device_buffer(gpu, "shares", bytemuck::cast_slice(&whole))?,
+            clips,
+            half_mm,
             tree: device_buffer(gpu, "tree", bytemuck::cast_slice(&packed(&bvh.nodes)))?,
             triangles: device_buffer(gpu, "triangles", bytemuck::cast_slice(&triangles))?,
             looks: device_buffer(gpu, "looks", bytemuck::cast_slice(&looks))?,
@@ -81,6 +103,26 @@ impl Surfaces {
             two_sided,
             nodes: bvh.nodes,
         })
+    }
+
+    /// Cuts them by other clips, with maps of meshes as `settings` say. Uses the device's queue and waits for it; of the maps and shares of before nothing
+    /// may be in use.
+    ///
+    /// # Errors
+    /// More than [`Clip::MAX`], impossible poses, meshes that bound no solid: then the clips before stay.
+    pub fn set_clips(&mut self, gpu: &Gpu, clips: &[Clip], settings: MapSettings) -> Result<()> {
+        let mut planned = self.clips.planned(gpu, clips, None, self.half_mm, settings)?;
+        if planned.has_todo() {
+            planned.make(gpu, &Peel::new(gpu)?, &Dilate::new(gpu)?)?;
+        }
+        let shares = Shares::new(gpu)?;
+        let mut rec = gpu.recorder("clips of meshes")?;
+        planned.record(&mut rec, clips, self.half_mm)?;
+        rec.barrier(&[Access::StorageRead], &[Access::StorageWrite]);
+        shares.record(&mut rec, &self.triangles, &planned, &self.shares)?;
+        rec.submit_and_wait()?;
+        self.clips = planned;
+        Ok(())
     }
 
     /// The tree of what each triangle may occlude within `delta_mm`. Uses the device's queue and waits for it.

@@ -62,6 +62,8 @@ impl Trace {
             looks: &surfaces.looks,
             materials: &surfaces.materials,
             texels: &surfaces.texels,
+            clips: &surfaces.clips.clips,
+            layers: &surfaces.clips.layers,
             geometry: &geometry.pixels,
             accessibility,
         };

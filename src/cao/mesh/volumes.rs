@@ -126,6 +126,7 @@ impl Volumes {
                     eyes: &geometry.eyes,
                     items: &world.items,
                     triangles: &surfaces.triangles,
+                    shares: &surfaces.shares,
                     geometry: &geometry.pixels,
                     made,
                 };
@@ -135,6 +136,7 @@ impl Volumes {
                     eyes: &geometry.eyes,
                     items: &world.items,
                     triangles: &surfaces.triangles,
+                    shares: &surfaces.shares,
                     geometry: &geometry.pixels,
                 };
                 rec.draw(&self.dynamic, &binds, push, attachments, vertices * count)?;

@@ -8,7 +8,7 @@ use cao_gpu::Result;
 use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
 use cao_kernels::conv3 as kernel;
 use cao_kernels::shared::tile::{TILE_X, TILE_Y, TILE_Z};
-use cao_model::network::{Layer, half, half_bits};
+use cao_model::network::{Form, Layer, half, half_bits};
 use std::ops::Range;
 
 /// The kernel `conv3`.
@@ -154,24 +154,11 @@ pub fn flops(blocks: u32, doubled: bool) -> f64 {
     f64::from(2 * TILE_X * TILE_Y * TILE_Z * taps * CHANNELS) * f64::from(CHANNELS * blocks)
 }
 
-/// What a convolution is to the kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
-    /// Of the grid.
-    First,
-    /// Of one tensor.
-    Plain,
-    /// Of two tensors, doubled.
-    Doubled,
-    /// Of two tensors, to the grid.
-    Last,
-}
-
 /// Weights as the kernel takes them: of each output block and input block, each voxel of the kernel, each input, 8 outputs. Two tensors beside each
 /// other have half the inputs each, and begin a block each. Channels beyond the last have weights 0. In f16, two a word: sums of weights are rounded
 /// once more, as tensors are.
-pub fn packed(layer: &Layer, weights: &[u16], form: Form) -> Vec<u16> {
-    let tensors = if matches!(form, Form::Doubled | Form::Last) { 2 } else { 1 };
+pub fn packed(layer: &Layer, weights: &[u16]) -> Vec<u16> {
+    let (form, tensors) = (layer.form, layer.form.tensors());
     let each = layer.inputs / tensors;
     let (in_blocks, out_blocks) = (each.div_ceil(CHANNELS) * tensors, layer.outputs.div_ceil(CHANNELS));
     let lanes = CHANNELS as usize;

@@ -4,7 +4,7 @@
 //! Memory: 2 bytes a weight, 64 / 27 of that where what goes in is doubled; tensors as [`Plan`] has them; 8 bytes a voxel of
 //! the grid.
 
-use super::conv3::{self, Conv3, Form, Given, Input, Over};
+use super::conv3::{self, Conv3, Given, Input, Over};
 use super::moments::{self, Moments, NORM, PARTIAL};
 use super::plan::{Plan, Step};
 use super::resize::{self, Resize};
@@ -43,13 +43,7 @@ impl Weights {
     /// Uses the device's queue and waits for it.
     pub fn new(gpu: &Gpu, network: &Network) -> Result<Self> {
         let buffer = |(layer, weights): (cao_model::network::Layer, &[u16])| {
-            let form = match layer.name.as_str() {
-                "first" => Form::First,
-                "last" => Form::Last,
-                name if name.starts_with("decoder") && name.ends_with(".0") => Form::Doubled,
-                _ => Form::Plain,
-            };
-            device_buffer(gpu, &layer.name, bytemuck::cast_slice(&conv3::packed(&layer, weights, form)))
+            device_buffer(gpu, &layer.name, bytemuck::cast_slice(&conv3::packed(&layer, weights)))
         };
         Ok(Self(network.layers().map(buffer).collect::<Result<_>>()?))
     }

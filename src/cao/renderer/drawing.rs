@@ -7,6 +7,7 @@ use crate::draw::eyes::Views;
 use crate::draw::picture::Picture;
 use crate::draw::raycast::Bindings;
 use crate::draw::target::Targets;
+use crate::mesh::light::VolumeShade;
 use crate::stages;
 use crate::{Error, Result};
 use cao_gpu::{Access, Recorder};
@@ -49,6 +50,13 @@ impl Renderer {
             drawn,
         )?;
         Ok(drawn)
+    }
+
+    /// The ambient values, for what else stands in the volume.
+    pub(crate) fn shade(&self) -> VolumeShade<'_> {
+        let subject = &self.subject;
+        let spacing = subject.field.spacing;
+        VolumeShade { ambient: self.ambient.fields().ambient, coloured: subject.coloured(), spacing }
     }
 
     /// As [`Self::record_picture`], all of it, with rays that end where the picture's depth says: view depths in mm.

@@ -11,6 +11,7 @@ use cao_formats::mesh_keys::{MeshFrom, MeshSource};
 use cao_formats::scene::{Scene, Stereo};
 use cao_model::frame::Turn;
 use cao_model::look::Look;
+use cao_model::settings::Scope;
 use cao_model::surface::{Instance, World};
 use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
@@ -55,6 +56,7 @@ pub fn run(
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
     let mut meshes = MeshRenderer::new(&gpu, &world, scene.mesh_occlusion)?;
+    meshes.set_clips(&turn.clips(&scene.clips))?;
     let mut timings = cao_gpu::Timings::new();
     let mut out = Out::new(global);
     out.device(&gpu);
@@ -67,6 +69,8 @@ pub fn run(
             let transfer = args::transfer(transfer, &mut volume, &args.input)?;
             let features = args.parts.of(scene.features.clone(), &volume, scene.frame)?;
             let mut setup = scene.occlusion.setup(volume.min_spacing())?;
+            // Meshes stand where the volume has nothing, too.
+            setup.scope = Scope::All;
             setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
             let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
             args.settings.give_network(&mut renderer)?;

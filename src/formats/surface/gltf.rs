@@ -51,6 +51,14 @@ pub(super) fn load(path: &Path) -> Result<Vec<Instance>> {
             format!("{}, which is not read; export without it", quoted(name)),
         ));
     }
+    // The crate's own checks panic at this one.
+    let there = |primitive: &Primitive| {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        positions.is_none_or(|index| root.get(*index).is_some())
+    };
+    if let Some(number) = root.meshes.iter().position(|mesh| !mesh.primitives.iter().all(there)) {
+        return Err(wrong(&format!("mesh {number}"), "names a POSITION that is not there".into()));
+    }
     let mut fault = None;
     root.validate(root, gltf::json::Path::new, &mut |at, error| {
         // What is required was looked at.
@@ -172,7 +180,6 @@ impl Reader<'_> {
         };
         let claimed =
             |index: Index<Accessor>| data.root.get(index).map_or(0, |accessor| accessor.count.0 as usize);
-        // Many primitives may name one accessor.
         self.positions = self.positions.saturating_add(claimed(at).max(primitive.indices.map_or(0, claimed)));
         if self.positions > 3 * MOST_TRIANGLES {
             return Err(
@@ -214,9 +221,18 @@ impl Reader<'_> {
         if let Some(index) = indices.iter().find(|index| **index as usize >= count) {
             return Err(data.wrong(field, format!("names vertex {index}, but there are only {count}")));
         }
-        let first = surface.positions.len() as u32;
+        // Only what is used: many primitives may name one accessor.
+        let first = surface.positions.len();
+        let (mut used, mut slots) = (Vec::new(), vec![None; count]);
+        let mut slot = |index: u32| {
+            *slots[index as usize].get_or_insert_with(|| {
+                used.push(index as usize);
+                (first + used.len() - 1) as u32
+            })
+        };
+        let indices: Vec<u32> = indices.into_iter().map(&mut slot).collect();
         let before = surface.triangles.len();
-        let corners = |three: [usize; 3]| three.map(|i| first + indices[i]);
+        let corners = |three: [usize; 3]| three.map(|i| indices[i]);
         match mode {
             Mode::TriangleStrip => (2..indices.len()).for_each(|i| {
                 // Every second one the other way, so that all face the same.
@@ -233,15 +249,15 @@ impl Reader<'_> {
         if surface.triangles.len() == before {
             return Err(data.wrong(field, "has no triangle; leave it out"));
         }
-        surface.positions.extend(positions.iter().map(|p| turn(*p) * MM as f32));
+        surface.positions.extend(used.iter().map(|&i| turn(positions[i]) * MM as f32));
         // What other primitives of the mesh lack is none: their triangles' own, or no place that a texture reads.
         if let Some(normals) = normals {
-            surface.normals.resize(first as usize, Vec3::ZERO);
-            surface.normals.extend(normals.into_iter().map(|n| turn(n).normalize_or_zero()));
+            surface.normals.resize(first, Vec3::ZERO);
+            surface.normals.extend(used.iter().map(|&i| turn(normals[i]).normalize_or_zero()));
         }
         if let Some(uvs) = uvs {
-            surface.uvs.resize(first as usize, Vec2::ZERO);
-            surface.uvs.extend(uvs.into_iter().map(Vec2::from_array));
+            surface.uvs.resize(first, Vec2::ZERO);
+            surface.uvs.extend(used.iter().map(|&i| Vec2::from_array(uvs[i])));
         }
         let all = surface.positions.len();
         if !surface.normals.is_empty() {

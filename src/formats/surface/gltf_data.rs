@@ -15,6 +15,9 @@ use gltf::json::{Index, Root, buffer};
 /// Most bytes of all buffers.
 const MOST_BYTES: u64 = 1 << 30;
 
+/// Most bytes of an accessor that has no buffer.
+const MOST_ZEROS: usize = 1 << 20;
+
 /// A document and its buffers.
 pub(super) struct Data<'a> {
     pub(super) path: &'a Path,
@@ -152,10 +155,14 @@ impl<'a> Data<'a> {
                 let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
                 self.elements(&field, self.view(view)?, offset, count, size, stride)?
             }
-            // Zeros, most of which nothing stands for: no more than files may have.
-            None => match count.checked_mul(size).filter(|bytes| *bytes as u64 <= super::MAX_BYTES) {
+            // Zeros, for which nothing stands: memory follows the file nevertheless.
+            None => match count.checked_mul(size).filter(|bytes| *bytes <= MOST_ZEROS) {
                 Some(bytes) => vec![0; bytes],
-                None => return Err(wrong("has more places than bytes are read")),
+                None => {
+                    return Err(wrong(
+                        "has no bufferView and too many places; expected one, or at most 1 MiB",
+                    ));
+                }
             },
         };
         if let Some(sparse) = &accessor.sparse {

@@ -6,6 +6,7 @@ use cao_model::surface::World;
 use glam::{DVec3, Vec2};
 
 /// Linear red, green, blue towards `eye`, with the light from the direction `light`.
+/// `open` is the accessibility times the volume's factor there.
 pub fn lit(world: &World, shown: &Shown, open: f64, look: &Look, light: DVec3, eye: DVec3) -> [f64; 3] {
     let triangle = &world.triangles[shown.hit.triangle];
     let [u, v] = shown.hit.at;

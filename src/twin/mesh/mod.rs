@@ -5,5 +5,6 @@ pub mod gbuffer;
 pub mod light;
 pub mod occluder;
 pub mod ray;
+pub mod shares;
 pub mod trace;
 pub mod upsample;

@@ -1,5 +1,6 @@
 //! The first triangle that a ray hits, of all of them one after the other.
 
+use cao_model::clip::Clip;
 use cao_model::surface::World;
 use glam::{DVec3, Vec2};
 
@@ -14,8 +15,15 @@ pub struct Hit {
     pub at: [f64; 2],
 }
 
-/// The first hit between `begin` and `end`, where masks leave something.
-pub fn first_hit(world: &World, origin: DVec3, direction: DVec3, begin: f64, end: f64) -> Option<Hit> {
+/// The first hit between `begin` and `end`, where masks and these clips, which are no meshes, leave something.
+pub fn first_hit(
+    world: &World,
+    clips: &[Clip],
+    origin: DVec3,
+    direction: DVec3,
+    begin: f64,
+    end: f64,
+) -> Option<Hit> {
     let mut first: Option<Hit> = None;
     for (index, triangle) in world.triangles.iter().enumerate() {
         let [a, b, c] = triangle.corners.map(|corner| corner.as_dvec3());
@@ -34,7 +42,9 @@ pub fn first_hit(world: &World, origin: DVec3, direction: DVec3, begin: f64, end
         }
         let weights = [1.0 - u - v, u, v].map(|weight| weight as f32);
         let uv: Vec2 = triangle.uvs.iter().zip(weights).map(|(uv, weight)| *uv * weight).sum();
-        if world.materials[triangle.material as usize].is_there(uv) {
+        let place = (origin + direction * t).as_vec3();
+        let hidden = clips.iter().any(|clip| clip.hides(place) == Some(true));
+        if !hidden && world.materials[triangle.material as usize].is_there(uv) {
             first = Some(Hit { t, triangle: index, at: [u, v] });
         }
     }

@@ -2,6 +2,7 @@
 //! square, `r² = u`, `φ = 2πv`: another rule than the kernel's sequence, which converges to the same.
 
 use super::ray::first_hit;
+use cao_model::clip::Clip;
 use cao_model::surface::World;
 use glam::DVec3;
 use std::f64::consts::TAU;
@@ -10,7 +11,7 @@ use std::f64::consts::TAU;
 const START: f64 = 1e-3;
 
 /// At a place with this normal, by `edge`² rays.
-pub fn traced(world: &World, place: DVec3, normal: DVec3, delta: f64, edge: u32) -> f64 {
+pub fn traced(world: &World, clips: &[Clip], place: DVec3, normal: DVec3, delta: f64, edge: u32) -> f64 {
     let tangent = normal.any_orthonormal_vector();
     let bitangent = normal.cross(tangent);
     let origin = place + normal * START;
@@ -22,7 +23,8 @@ pub fn traced(world: &World, place: DVec3, normal: DVec3, delta: f64, edge: u32)
             let ring = u.sqrt();
             let direction =
                 tangent * (ring * angle.cos()) + bitangent * (ring * angle.sin()) + normal * (1.0 - u).sqrt();
-            sum += first_hit(world, origin, direction, 0.0, delta).map_or(0.0, |hit| 1.0 - hit.t / delta);
+            sum +=
+                first_hit(world, clips, origin, direction, 0.0, delta).map_or(0.0, |hit| 1.0 - hit.t / delta);
         }
     }
     sum / f64::from(edge).powi(2)

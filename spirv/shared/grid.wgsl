@@ -1,0 +1,4 @@
+// Numbers of a grid, x fastest.
+struct Grid {
+    all: array<f32>,
+}
