@@ -44,11 +44,12 @@ fn depths(gpu: &Gpu, picture: &Picture) -> Vec<Vec<f32>> {
 
 /// Share of the pixels that differ by more than rounding.
 fn off(found: &[[f32; 4]], expected: &[[f32; 4]]) -> f64 {
-    let far = |(f, e): &(&[f32; 4], &[f32; 4])| {
+    // So that a NaN is not near.
+    let near = |(f, e): &(&[f32; 4], &[f32; 4])| {
         let (f, e) = (Vec4::from(**f), Vec4::from(**e));
-        !(f.truncate().distance(e.truncate()) <= NORMAL && (f.w - e.w).abs() <= DEPTH * e.w)
+        f.truncate().distance(e.truncate()) <= NORMAL && (f.w - e.w).abs() <= DEPTH * e.w
     };
-    found.iter().zip(expected).filter(far).count() as f64 / expected.len() as f64
+    1.0 - found.iter().zip(expected).filter(near).count() as f64 / expected.len() as f64
 }
 
 #[test]
