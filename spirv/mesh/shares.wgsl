@@ -24,6 +24,10 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         return;
     }
     let triangle = triangles.triangle[index];
+    if (u32(triangle.c.w) & SPARED) != 0u {
+        shares.triangle[index] = triangle.a.w;
+        return;
+    }
     var left = 0u;
     for (var i = 0u; i < EDGE; i++) {
         for (var j = 0u; j < EDGE - i; j++) {

@@ -41,6 +41,11 @@ fn is_there(index: u32, triangle: WorldTriangle, at: vec2<f32>) -> bool {
     return material.colour.a * texture_at(material, uv_at(looks.triangle[index], at)).a >= material.cutoff;
 }
 
+// Whether clips leave a place of a triangle.
+fn is_left(triangle: WorldTriangle, place: vec3<f32>) -> bool {
+    return (u32(triangle.c.w) & SPARED) != 0u || visible(place);
+}
+
 // The first hit behind `begin` and before `end`; of none NO_TRIANGLE, at `end`.
 fn first_hit(origin: vec3<f32>, direction: vec3<f32>, begin: f32, end: f32) -> Hit {
     // Of an axis that the ray does not run along, so far that only boxes about it are crossed.
@@ -65,7 +70,7 @@ fn first_hit(origin: vec3<f32>, direction: vec3<f32>, begin: f32, end: f32) -> H
             let triangle = triangles.triangle[first + k];
             let at = hit_of(triangle, origin, direction);
             let passes = at.x > begin && at.x < hit.t;
-            if passes && is_there(first + k, triangle, at.yz) && visible(origin + at.x * direction) {
+            if passes && is_there(first + k, triangle, at.yz) && is_left(triangle, origin + at.x * direction) {
                 hit = Hit(at.x, first + k, at.yz);
             }
         }

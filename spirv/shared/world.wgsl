@@ -20,7 +20,7 @@ struct WorldTriangle {
     a: vec4<f32>,
     // a corner; the number of its material
     b: vec4<f32>,
-    // a corner; MASKED and TWO_SIDED
+    // a corner; MASKED, TWO_SIDED, SLIVER, SPARED
     c: vec4<f32>,
 }
 
@@ -30,6 +30,8 @@ const MASKED = 1u;
 const TWO_SIDED = 2u;
 // Whose volume is cut by the box of the triangle: corners are so sharp that it would reach far.
 const SLIVER = 4u;
+// Which clips leave whole.
+const SPARED = 8u;
 
 // What is left of each triangle, of its area: what neither its mask nor a clip takes.
 struct Shares {

@@ -10,6 +10,7 @@
 //!     rotate_deg = [0, 0, 90]          # about the fixed axes x, then y, then z
 //!     scale = 0.5                      # or one number an axis: [1, 1, 2]
 //!     colour = "#c8b090"               # instead of the file's own; masks stay
+//!     spared = true                    # whether clips leave it whole; default: false
 //!     two_sided = true                 # whether backs are surfaces, too; default: as the file has it, docs/formats.md
 //!
 //!     [mesh_occlusion]
@@ -53,6 +54,8 @@ pub struct MeshSource {
     pub colour: Option<[f32; 3]>,
     /// Whether all its materials have two sides; `None`: as each says.
     pub two_sided: Option<bool>,
+    /// Whether clips leave it whole.
+    pub spared: bool,
 }
 
 /// Where a mesh comes from.
@@ -74,8 +77,8 @@ impl MeshSource {
             MeshFrom::File(path) => surface::load(path)?,
             MeshFrom::Builtin(scene, detail) => (scene.make)(*detail),
         };
-        let changed = |surface: &Arc<Surface>| match (self.colour, self.two_sided) {
-            (None, None) => surface.clone(),
+        let changed = |surface: &Arc<Surface>| match (self.colour, self.two_sided, self.spared) {
+            (None, None, false) => surface.clone(),
             _ => Arc::new(Surface {
                 materials: surface.materials.iter().map(|material| self.changed(material)).collect(),
                 ..(**surface).clone()
@@ -99,6 +102,7 @@ impl MeshSource {
     /// A material with what the scene says instead.
     fn changed(&self, material: &Material) -> Material {
         let mut changed = material.clone();
+        changed.spared = self.spared;
         changed.two_sided = self.two_sided.unwrap_or(changed.two_sided);
         if let Some(colour) = self.colour {
             changed.colour = colour;
@@ -124,6 +128,8 @@ pub(crate) struct MeshFile {
     scale: Option<Value>,
     colour: Option<Value>,
     two_sided: Option<bool>,
+    #[serde(default)]
+    spared: bool,
 }
 
 impl MeshFile {
@@ -154,6 +160,7 @@ impl MeshFile {
             pose: pose(key, self.translate_mm, self.rotate_deg, self.scale.as_ref())?,
             colour: self.colour.map(|colour| parse_colour(&of("colour"), &colour)).transpose()?,
             two_sided: self.two_sided,
+            spared: self.spared,
         })
     }
 }

@@ -45,6 +45,8 @@ pub struct Material {
     pub cutoff: Option<f32>,
     /// Whether the back is a surface of its own, as of leaves and fences, which occludes what it faces.
     pub two_sided: bool,
+    /// Whether clips leave it whole, as an implant that a view is opened for.
+    pub spared: bool,
 }
 
 impl Default for Material {
@@ -57,6 +59,7 @@ impl Default for Material {
             texture: None,
             cutoff: None,
             two_sided: false,
+            spared: false,
         }
     }
 }

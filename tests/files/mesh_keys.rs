@@ -42,7 +42,7 @@ fn every_key_of_a_mesh_is_read() {
     encoder.write_header().unwrap().write_image_data(&[9, 9, 9, 200]).unwrap();
     put("t.png", &png);
     let text = "[[mesh]]\nfile = \"a.obj\"\ntranslate_mm = [1, 2, 3]\nrotate_deg = [0, 0, 90]\nscale = [2, 1, 1]\ncolour = \"#00ff00\"\n\
-                two_sided = false\n[[mesh]]\nbuiltin = \"level\"\ndetail = 1\n[mesh_occlusion]\nmethod = \"aov\"\ndelta_mm = 7\nsparse = 15\n";
+                two_sided = false\nspared = true\n[[mesh]]\nbuiltin = \"level\"\ndetail = 1\n[mesh_occlusion]\nmethod = \"aov\"\ndelta_mm = 7\nsparse = 15\n";
     let scene = Scene::from_toml(text, folder.path()).unwrap();
     let instances = scene.meshes[0].instances().unwrap();
     let world = World::new(&instances).unwrap();
@@ -54,6 +54,7 @@ fn every_key_of_a_mesh_is_read() {
     );
     let [m, n] = &world.materials[..] else { panic!("{:?}", world.materials) };
     assert_eq!((m.colour, m.two_sided, m.cutoff), ([0.0, 1.0, 0.0], false, Some(0.5)));
+    assert!(m.spared && n.spared);
     assert_eq!(m.texture.as_ref().unwrap().texels, [[255, 255, 255, 200]], "its mask is left");
     assert_eq!((n.colour, n.two_sided, n.texture.is_none()), ([0.0, 1.0, 0.0], false, true));
     assert_eq!(scene.meshes[1].instances().unwrap()[0].surface.name, "level");

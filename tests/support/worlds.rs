@@ -55,7 +55,7 @@ pub fn world_of(surfaces: Vec<Surface>) -> World {
     World::new(&surfaces.into_iter().map(place).collect::<Vec<_>>()).unwrap()
 }
 
-/// A floor and two walls, a box, a net of two sides with holes, a needle: 70 triangles in a room of 100 mm.
+/// A floor and two walls, a box, a net of two sides with holes, a needle that clips spare: 70 triangles in a room of 100 mm.
 pub fn corner() -> World {
     let plain = Material::default;
     let (x, y, z) = (Vec3::X * 100.0, Vec3::Y * 100.0, Vec3::Z * 60.0);
@@ -67,7 +67,7 @@ pub fn corner() -> World {
         uvs: Vec::new(),
         triangles: vec![[0, 1, 2]],
         material_of: vec![0],
-        ..sheet(Vec3::ZERO, Vec3::X, Vec3::Y, 1, Material { two_sided: true, ..plain() })
+        ..sheet(Vec3::ZERO, Vec3::X, Vec3::Y, 1, Material { two_sided: true, spared: true, ..plain() })
     };
     world_of(vec![
         sheet(Vec3::ZERO, x, y, 4, plain()),

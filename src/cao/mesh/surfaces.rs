@@ -202,6 +202,9 @@ fn on_device(triangle: &Triangle, world: &World) -> kernel::WorldTriangle {
     if material.two_sided {
         kind |= kernel::TWO_SIDED;
     }
+    if material.spared {
+        kind |= kernel::SPARED;
+    }
     if is_sliver(triangle.corners) {
         kind |= kernel::SLIVER;
     }

@@ -298,6 +298,7 @@ impl Reader<'_> {
             texture: texture.map(|index| self.texture(index, &field)).transpose()?,
             cutoff,
             two_sided: json.double_sided,
+            spared: false,
         })
     }
 

@@ -138,6 +138,7 @@ impl Library {
             texture,
             cutoff: masked.then_some(CUTOFF),
             two_sided: masked,
+            spared: false,
         }))
     }
 }

@@ -43,8 +43,9 @@ pub fn first_hit(
         let weights = [1.0 - u - v, u, v].map(|weight| weight as f32);
         let uv: Vec2 = triangle.uvs.iter().zip(weights).map(|(uv, weight)| *uv * weight).sum();
         let place = (origin + direction * t).as_vec3();
-        let hidden = clips.iter().any(|clip| clip.hides(place) == Some(true));
-        if !hidden && world.materials[triangle.material as usize].is_there(uv) {
+        let material = &world.materials[triangle.material as usize];
+        let hidden = !material.spared && clips.iter().any(|clip| clip.hides(place) == Some(true));
+        if !hidden && material.is_there(uv) {
             first = Some(Hit { t, triangle: index, at: [u, v] });
         }
     }

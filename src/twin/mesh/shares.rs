@@ -15,7 +15,9 @@ pub fn shares(world: &World, clips: &[Clip]) -> Vec<f64> {
             let [u, v] = point.map(|k| (k as f32 + 1.0 / 3.0) / EDGE as f32);
             a * (1.0 - u - v) + b * u + c * v
         });
-        let left = places.filter(|place| !clips.iter().any(|clip| clip.hides(*place) == Some(true)));
+        let spared = world.materials[triangle.material as usize].spared;
+        let left =
+            places.filter(|place| spared || !clips.iter().any(|clip| clip.hides(*place) == Some(true)));
         f64::from(triangle.opacity) * left.count() as f64 / f64::from(EDGE * (EDGE + 1) / 2)
     };
     world.triangles.iter().map(of).collect()
