@@ -52,10 +52,6 @@ fn none() -> String {
 }
 
 impl Found {
-    fn half(&self) -> Of {
-        Of::Rays(PRINTED_RAYS / 2)
-    }
-
     /// What one has to know to read it, line by line.
     pub fn caption(&self) -> Vec<String> {
         let [device, driver] = &self.device;
@@ -76,7 +72,7 @@ impl Found {
             format!(
                 "Convergence: the reference's first half against all of it: {}.",
                 self.each(|found| {
-                    let half = found.row(self.half());
+                    let half = found.row(Of::Rays(PRINTED_RAYS / 2));
                     half.map_or(none(), |row| format!("{} (RMSE {})", variance(row.error), short(row.rmse)))
                 })
             ),
@@ -211,17 +207,22 @@ impl Found {
         let Some(found) = self.scenes.first() else { return drawing };
         let name = found.scene.name;
         let theirs = Printed::of(name).map_or("", |printed| printed.theirs);
-        let ours = |of: Of| found.row(of).map(|row| [row.median(), row.error]);
+        // Times of a software driver are no times of anything else.
+        let over = |ms: f64| if self.software { ms } else { 1.0 };
+        let label = if self.software { "time / that of AOV at every pixel" } else { "ms" };
+        let aov = found.row(Of::Gathered(1)).map_or(f64::NAN, Row::median);
+        let ours = |of: Of| found.row(of).map(|row| [row.median() / over(aov), row.error]);
+        let printed_aov = Of::Gathered(1).printed(name).map_or(f64::NAN, |[ms, _]| ms);
         let printed = |of: Of| match of {
             Of::Drawn { .. } => None,
-            of => of.printed(name),
+            of => of.printed(name).map(|[ms, error]| [ms / over(printed_aov), error]),
         };
         let titles = [
             format!("{name}, {} × {}", self.plan.size[0], self.plan.size[1]),
             format!("{theirs}, as printed"),
         ];
-        panel(&mut drawing, LEFTS[0], &titles[0], &ours);
-        panel(&mut drawing, LEFTS[1], &titles[1], &printed);
+        panel(&mut drawing, LEFTS[0], [&titles[0], label], &ours);
+        panel(&mut drawing, LEFTS[1], [&titles[1], label], &printed);
         let mut x = LEFTS[0];
         for (name, colour, marker, _) in LINES {
             drawing.marker(marker, [x, SHEET[1] - 22.0], 4.0, colour, false);
@@ -275,7 +276,7 @@ impl Found {
         body += &self.fits();
         body += &section(
             "Fig. 10: time against error",
-            "Nearer to the lower left is better. Dashed: the error of Crytek, whose number of samples does not change.",
+            "Nearer to the lower left is better. Dashed: the error of Crytek, whose number of samples does not change. Of the other scenes meshes.csv has the numbers.",
         );
         body += &inline(&self.figure_10());
         body += &section("Fig. 11: accessibility", "");
@@ -356,13 +357,18 @@ impl Found {
 }
 
 /// Time against error: a line of each method.
-fn panel(drawing: &mut Drawing, left: f64, title: &str, value: &dyn Fn(Of) -> Option<[f64; 2]>) {
+fn panel(
+    drawing: &mut Drawing,
+    left: f64,
+    [title, label]: [&str; 2],
+    value: &dyn Fn(Of) -> Option<[f64; 2]>,
+) {
     let every: Vec<[f64; 2]> =
         LINES.iter().flat_map(|(.., rows)| rows.iter().filter_map(|of| value(*of))).collect();
     let panel = Panel {
         at: [left, 40.0],
         size: FRAME,
-        x: Axis::log("ms", every.iter().map(|[ms, _]| *ms)),
+        x: Axis::log(label, every.iter().map(|[ms, _]| *ms)),
         y: Axis::log("error, AOV eq. (31)", every.iter().map(|[_, error]| *error)),
     };
     panel.draw(drawing, title);
