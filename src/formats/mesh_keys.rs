@@ -17,7 +17,7 @@
 //!     delta_mm = 60                    # how far obscurance reaches; default: a tenth of the half diagonal of all meshes
 //!     sparse = 5                       # of aov: every fifth pixel in each direction is computed; 1 3 5 15
 //!     ## rays = 256                     # of rays: rays of a pixel
-//!     ## samples = 16                   # of crytek, volumetric, hbao: texels that are read around a pixel, 1 to 1024
+//!     ## samples = 16                   # of volumetric, hbao: texels that are read around a pixel, 1 to 1024
 //!     "##,
 //!     std::path::Path::new("."),
 //! )?;

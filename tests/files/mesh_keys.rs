@@ -131,7 +131,7 @@ fn what_is_wrong_with_meshes_is_refused_by_name() {
             "mesh_occlusion.rays: -1: expected",
         ),
         (
-            &format!("{house}[mesh_occlusion]\nmethod = \"crytek\"\nsamples = 1025"),
+            &format!("{house}[mesh_occlusion]\nmethod = \"volumetric\"\nsamples = 1025"),
             "mesh_occlusion.samples: 1025: expected 1 to 1024",
         ),
     ] {

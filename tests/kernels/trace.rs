@@ -1,6 +1,7 @@
 //! The kernel `trace` against its twin, and in pieces.
 
-use cao::mesh::trace::Trace;
+use cao::mesh::ambient::{ByRays, PixelAmbient, Pixels as On};
+use cao_gpu::Access;
 use cao_testing::worlds::{Pixels, clips, corner, corner_eyes, floats};
 use cao_testing::*;
 use cao_twin::mesh::gbuffer::gbuffer;
@@ -22,15 +23,21 @@ fn rays_give_what_the_twin_integrates() {
     let gpu = open();
     let (world, views, clips) = (corner(), corner_eyes(SIZE), &clips()[..1]);
     let pixels = Pixels::clipped(&gpu, &world, clips, &views, SIZE);
-    let (trace, accessibility) = (Trace::new(&gpu).unwrap(), pixels.values(&gpu));
-    let run = |all: u32, to| {
-        let mut progress = Vec::new();
-        let (surfaces, geometry) = (&pixels.surfaces, &pixels.geometry);
-        trace.run(&gpu, surfaces, geometry, DELTA, all, to, &mut |share| progress.push(share)).unwrap();
-        assert_eq!(progress.last(), Some(&1.0));
+    let accessibility = pixels.values(&gpu);
+    let (surfaces, geometry) = (&pixels.surfaces, &pixels.geometry);
+    let on = On { gpu: &gpu, geometry, surfaces, delta_mm: DELTA };
+    let traced_by = |rays: u32| {
+        let method = ByRays::new(&gpu, rays).unwrap();
+        for part in 0..method.parts(&on) {
+            run(&gpu, |rec| {
+                rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
+                method.record(rec, &on, part, &accessibility).unwrap();
+            });
+        }
+        (floats(&gpu, &accessibility), method.parts(&on))
     };
-    run(512, &accessibility);
-    let found = floats(&gpu, &accessibility);
+    let (found, parts) = traced_by(512);
+    assert!(parts > 1, "all at once");
     let (mut sum, mut bias, mut count) = (0.0, 0.0, 0.0);
     for (view, eye) in views.iter().enumerate() {
         for (i, shown) in gbuffer(&world, clips, eye, SIZE).into_iter().enumerate().step_by(EVERY) {
@@ -49,12 +56,7 @@ fn rays_give_what_the_twin_integrates() {
     let rms = |a: &[f32], b: &[f32]| {
         (a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
     };
-    let fewer: Vec<f64> = [16, 128]
-        .map(|rays| {
-            run(rays, &accessibility);
-            rms(&floats(&gpu, &accessibility), &found)
-        })
-        .to_vec();
+    let fewer = [16, 128].map(|rays| rms(&traced_by(rays).0, &found));
     assert!(fewer[1] < 0.3 * fewer[0], "{fewer:?}");
     drop((pixels, accessibility));
     close(gpu);

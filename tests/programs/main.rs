@@ -9,6 +9,7 @@ mod cli_refusals;
 mod dicom;
 mod features;
 mod gallery;
+mod meshes;
 mod orders;
 mod peers;
 mod readings;

@@ -23,6 +23,7 @@ mod leaks;
 mod lengths;
 mod light;
 mod limits;
+mod meshes;
 mod methods;
 mod planner;
 mod reach;

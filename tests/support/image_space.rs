@@ -86,8 +86,9 @@ impl Rooms {
 /// Share of the pixels whose values differ by more than rounding.
 pub fn differing(found: &[f32], expected: &[f64], rounding: f64) -> f64 {
     assert_eq!(found.len(), expected.len());
-    let far = |(a, b): &(&f32, &f64)| !((f64::from(**a) - **b).abs() <= rounding);
-    found.iter().zip(expected).filter(far).count() as f64 / expected.len() as f64
+    // So that a NaN is not near.
+    let near = |(a, b): &(&f32, &f64)| (f64::from(**a) - **b).abs() <= rounding;
+    1.0 - found.iter().zip(expected).filter(near).count() as f64 / expected.len() as f64
 }
 
 /// Values that commands write, view by view.

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::mesh::gather::{Blocks, Gather, Scene};
 use crate::mesh::geometry::Geometry;
 use crate::mesh::surfaces::{Surfaces, VolumeTree};
-use crate::mesh::trace::Trace;
+use crate::mesh::trace::{Rays, Trace};
 use crate::mesh::upsample::Upsample;
 use crate::stages;
 use cao_gpu::{Access, Buffer, Gpu, Recorder};
@@ -73,9 +73,9 @@ impl PixelAmbient for ByRays {
 
     fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
-        let rays = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
+        let some = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
         rec.stage(stages::TRACE)?;
-        self.trace.record(rec, surfaces, geometry, delta_mm, rays, self.rays, accessibility)?;
+        self.trace.record(rec, surfaces, geometry, delta_mm, Rays { some, all: self.rays }, accessibility)?;
         Ok(rec.end_stage()?)
     }
 }

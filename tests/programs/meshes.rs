@@ -1,0 +1,47 @@
+//! `cao render` of scenes with meshes.
+
+use crate::support::Folder;
+
+#[test]
+fn scenes_of_meshes_are_drawn_by_every_method() {
+    let folder = Folder::with_device();
+    for (method, more) in
+        [("aov", "sparse = 5"), ("rays", "rays = 8"), ("crytek", ""), ("volumetric", ""), ("hbao", "")]
+    {
+        let scene = format!(
+            "[[mesh]]\nbuiltin = \"fence\"\ndetail = 1\n[mesh_occlusion]\nmethod = \"{method}\"\n{more}\n\
+             [image]\nwidth = 64\nheight = 36\nsamples = 4\n"
+        );
+        folder.put("scene.toml", scene);
+        let answer = folder.json(&format!("render scene.toml -o {method}.png --eyes l.png,r.png"));
+        assert_eq!(answer["mesh_method"], method);
+        assert_eq!(answer["triangles"], 728);
+        assert!(answer["stages_ms"]["gbuffer"].as_f64().is_some_and(|ms| ms > 0.0), "{answer}");
+        let pixels = image::open(folder.path(&format!("{method}.png"))).unwrap().into_rgb8();
+        assert_eq!(pixels.dimensions(), (128, 36));
+        let different: std::collections::HashSet<_> = pixels.pixels().collect();
+        assert!(different.len() > 200, "{method}: {} colours", different.len());
+    }
+}
+
+#[test]
+fn meshes_stand_in_volumes_and_are_cut_with_them() {
+    let folder = Folder::with_device();
+    let scene = |clip: &str| {
+        format!(
+            "volume = \"builtin:engine:24\"\n[[mesh]]\nbuiltin = \"house\"\ndetail = 1\nscale = 0.02\n{clip}\
+             [image]\nwidth = 48\nheight = 48\n"
+        )
+    };
+    folder.put("whole.toml", scene(""));
+    folder.put("cut.toml", scene("[[clip]]\nshape = \"sphere\"\nscale = 9\ntranslate_mm = [6, -6, 6]\n"));
+    let answer = folder.json("render whole.toml -o whole.png");
+    assert_eq!((&answer["dims"][0], &answer["method"]), (&24.into(), &"rays".into()));
+    folder.json("render cut.toml -o cut.png");
+    let picture = |name: &str| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
+    let (whole, cut) = (picture("whole.png"), picture("cut.png"));
+    let changed = whole.iter().zip(&cut).filter(|(a, b)| a.abs_diff(**b) > 20).count();
+    assert!(changed > 100, "{changed}");
+    let refused = folder.run("render whole.toml -o x.png --budget-ms 10");
+    assert!(refused.code == Some(2) && refused.err.contains("this scene has meshes"), "{}", refused.err);
+}
