@@ -2,6 +2,7 @@
 
 mod bundle;
 mod chart;
+mod chart_meshes;
 mod cli;
 mod cli_outputs;
 mod cli_refusals;

@@ -50,6 +50,17 @@ const FDAO: [&str; 5] = ["features.html", "features.csv", "figure-1.png", "figur
 /// What `--dvao` writes.
 const DVAO: [&str; 3] = ["network.html", "network.csv", "figure-8.png"];
 
+/// What `--meshes` writes.
+const MESHES: [&str; 7] = [
+    "meshes.html",
+    "meshes.csv",
+    "fits.csv",
+    "verdicts.csv",
+    "figure-10.svg",
+    "figure-10.png",
+    "figure-11.png",
+];
+
 pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
@@ -63,6 +74,9 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     }
     if args.dvao {
         return dvao(global, args);
+    }
+    if args.meshes {
+        return meshes(global, args);
     }
     let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
@@ -239,6 +253,62 @@ fn dvao(global: &Global, args: &Args) -> Result<ExitCode> {
         })
         .collect();
     out.json(json!({ "edge": plan.edge, "rows": rows }));
+    for path in targets.paths() {
+        out.wrote(path);
+    }
+    out.finish()?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// `--meshes`.
+fn meshes(global: &Global, args: &Args) -> Result<ExitCode> {
+    let targets = Targets::in_folder(&args.output, MESHES.map(str::to_owned))?;
+    let mut progress = Progress::default();
+    progress.stage("preparing");
+    let gpu = open_gpu(global)?;
+    let plan = chart::meshes::Plan::of(&gpu, args.quick, args.size, args.rays, args.runs);
+    progress.stage("measuring");
+    let found = chart::meshes::measure(&gpu, &plan, &mut |what, share| {
+        progress.say(what);
+        progress.set(share);
+    })?;
+    check_validation(&gpu)?;
+    progress.stage("writing");
+    let panel = found.figure_10();
+    targets.write_all(&[
+        found.html(&machine(), &command())?.into_bytes(),
+        found.runs().into_bytes(),
+        found.fitted().into_bytes(),
+        found.judged().into_bytes(),
+        panel.svg().into_bytes(),
+        panel.png()?,
+        found.figure_11().png()?,
+    ])?;
+    drop(progress);
+    let mut out = Out::new(global);
+    out.device(&gpu);
+    for line in found.caption().into_iter().skip(1).chain(found.lines()) {
+        out.line(line);
+    }
+    let rows = found.scenes.iter().flat_map(|scene| scene.rows.iter().map(move |row| (scene, row)));
+    let rows: Vec<_> = rows
+        .map(|(scene, row)| {
+            json!({
+                "scene": scene.scene.name, "method": row.of.name(plan.rays), "printed": row.of.printed(scene.scene.name),
+                "error": row.error, "rmse": row.rmse, "ms": row.median(), "over_aov": scene.ratio(row.of)
+            })
+        })
+        .collect();
+    let verdicts: Vec<_> = found
+        .verdicts()
+        .into_iter()
+        .map(|verdict| {
+            json!({
+                "claim": verdict.claim, "holds": verdict.holds, "printed": verdict.printed, "reached": verdict.reached()
+            })
+        })
+        .collect();
+    out.json(json!({ "size": plan.size, "rays": plan.rays, "rows": rows, "verdicts": verdicts }));
     for path in targets.paths() {
         out.wrote(path);
     }

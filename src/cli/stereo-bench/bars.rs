@@ -510,6 +510,7 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     }
     rows.progress.set(0.8);
     super::networks::bars(cli, software, &mut rows)?;
+    super::meshes::bars(&gpu, software, &mut rows)?;
     rows.progress.set(0.9);
     if !software && cli.large {
         let scene = Scene::built_in("engine", 1024, 60.0)?;

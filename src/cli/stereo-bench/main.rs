@@ -12,6 +12,7 @@ mod bars;
 mod csv;
 mod frames;
 mod machine;
+mod meshes;
 mod networks;
 mod path;
 mod report;

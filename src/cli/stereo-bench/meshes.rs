@@ -1,0 +1,51 @@
+//! The bars of ambient occlusion volumes of meshes (AOV §6): a level of 10⁵ triangles at 1280 × 720, one view; small and not judged on a software driver.
+
+use super::bars::{Bar, RUNS, Row, Rows};
+use anyhow::Result;
+use cao::mesh::ambient::{ByVolumes, PixelAmbient};
+use cao::mesh::volumes::Volumes;
+use cao::mesh_renderer::MeshRenderer;
+use cao_gpu::{Gpu, Phase};
+use cao_measure::chart::meshes::FACTORS;
+use cao_model::look::Look;
+use cao_model::scenes::BuiltScene;
+use cao_model::surface::World;
+
+/// Milliseconds of every pixel, and of one of 25.
+const FULL_MS: f64 = 10.0;
+const SPARSE_MS: f64 = 2.0;
+
+/// All of them.
+pub fn bars(gpu: &Gpu, software: bool, rows: &mut Rows) -> Result<()> {
+    let scene = BuiltScene::parse("level")?;
+    let (detail, size) = if software { (1, [160, 90]) } else { (scene.detail, [1280, 720]) };
+    let world = World::new(&(scene.make)(detail))?;
+    let [left, _] = scene.eye.views(size[0] as f32 / size[1] as f32, 1.0, 1e5)?;
+    type Make = fn(&Gpu) -> cao::Result<Box<dyn PixelAmbient>>;
+    let ways: [(&str, Make, f64); 4] = [
+        ("AOV, gathered", |gpu| Ok(Box::new(ByVolumes::new(gpu, 1)?)), FULL_MS),
+        ("AOV, drawn, static", |gpu| Ok(Box::new(Volumes::new(gpu, true)?)), FULL_MS),
+        ("AOV, drawn, dynamic", |gpu| Ok(Box::new(Volumes::new(gpu, false)?)), FULL_MS),
+        ("AOV, 1/25 5x5", |gpu| Ok(Box::new(ByVolumes::new(gpu, 5)?)), SPARSE_MS),
+    ];
+    for (what, make, most_ms) in ways {
+        let delta_mm = FACTORS[0] * scene.delta_mm;
+        let mut renderer = MeshRenderer::with(gpu, &world, make(gpu)?, delta_mm)?;
+        let mut found = Vec::new();
+        for _ in 0..RUNS + 1 {
+            let (_, timings) = renderer.draw(&[left], &Look::default(), size, None, &mut |_| ())?;
+            found.push(timings.of(Phase::Ambient));
+        }
+        // Its first compiles, and clocks rise.
+        found.remove(0);
+        rows.push(Row {
+            place: format!("{}, {} triangles, {} x {}", scene.name, world.triangles.len(), size[0], size[1]),
+            what: what.into(),
+            bar: if software { Bar::None } else { Bar::AtMost(most_ms) },
+            unit: "ms",
+            found,
+            note: format!("δ {delta_mm} mm, left eye; what pixels show and their light are not counted"),
+        })?;
+    }
+    Ok(())
+}
