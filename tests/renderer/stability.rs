@@ -442,5 +442,8 @@ fn a_pixel_lies_in_more_volumes_the_farther_they_reach() {
     assert!(finding.ours == Ours::Limited && finding.control_fails, "{}", finding.sentence);
     let volumes = curve(&finding, 0, "AOV");
     assert!(volumes.at(2.0) > 4.0 * volumes.at(0.5) && volumes.at(0.5) > 1.0, "{}", finding.sentence);
+    let still = overdraw::Plan { reaches: vec![1.0], size: [8, 8], ..overdraw::Plan::of(Effort::Quick) };
+    let still = overdraw::run(&gpu, &still, &mut |_| ()).unwrap();
+    assert!(still.ours == Ours::Holds && !still.control_fails, "one reach shows nothing: {}", still.sentence);
     close(gpu);
 }
