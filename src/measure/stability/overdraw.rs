@@ -114,9 +114,9 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
     let times_reach = last[0] / first[0];
     // Of methods that this device ran, and took the time of.
     let timed: Vec<Series> = [
-        Series::ours("AOV, gathered (ours)", times[0].clone()),
-        Series::control("AOV, drawn", times[1].clone()),
-        Series::yardstick(format!("rays, {RAYS} a pixel"), times[2].clone()),
+        Series::ours("AOV gathered (ours)", times[0].clone()),
+        Series::control("AOV drawn", times[1].clone()),
+        Series::yardstick(format!("ray tracing with {RAYS} rays"), times[2].clone()),
     ]
     .into_iter()
     .filter(|series| !series.points.is_empty() && series.points.iter().all(|point| point[1] > 0.0))
