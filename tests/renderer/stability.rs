@@ -3,8 +3,8 @@
 
 use cao_measure::stability::{
     Effort, Finding, Ours, Role, Series, absorption, anisotropy, concave, cut, dilation, labels, layers, map,
-    mip_blocks, motion, network, noise, numbers, off_screen, pixels, radius, shape, sheets, shells, slope,
-    stacked_layers, stereo, tables, thin_sheets, views,
+    mesh_stereo, mip_blocks, motion, network, noise, numbers, off_screen, overdraw, pixels, radius, shape,
+    sheets, shells, slope, stacked, stacked_layers, stereo, tables, tessellation, thin_sheets, views,
 };
 use cao_model::occlusion::RaySet;
 use cao_testing::{close, open};
@@ -383,4 +383,67 @@ fn a_plane_seen_aslant_is_shaded_in_image_space_only() {
     for (name, frontal) in [("Crytek", 0.5), ("Volumetric", 1.0), ("HBAO", 1.0)] {
         assert!((curve(&finding, 0, name).at(0.0) - frontal).abs() < 1e-6, "{}", finding.sentence);
     }
+}
+
+#[test]
+fn eyes_agree_on_occlusion_volumes_of_every_pixel_and_on_nothing_else() {
+    let gpu = open();
+    let finding = mesh_stereo::run(&gpu, &mesh_stereo::Plan::of(Effort::Quick), &mut |_| ()).unwrap();
+    assert_shown(&finding);
+    for name in ["AOV, one pixel", "Crytek", "Volumetric", "HBAO"] {
+        let curve = curve(&finding, 0, name);
+        assert_eq!(curve.at(0.0), 0.0, "equal eyes have equal pictures: {name}");
+        assert!(curve.at(100.0) > 10.0 * mesh_stereo::ROUNDING, "{name}: {}", finding.sentence);
+    }
+    close(gpu);
+}
+
+/// Ours is AOV, and fails as it does. The numbers are known: of squares of half-side 1 at 0.5, 0.6, … above a point, in closed form.
+#[test]
+fn squares_behind_the_first_darken_by_volumes_and_not_by_rays() {
+    let finding = stacked::run(&stacked::Plan::of(Effort::Quick), &mut |_| ()).unwrap();
+    assert!(finding.ours == Ours::Limited && finding.control_fails, "{}", finding.sentence);
+    let [sum, ours, rays] = ["AOV's sum", "AOV (ours)", "rays"].map(|name| curve(&finding, 0, name));
+    let known = |h: f64| {
+        let side = (1.0 + h * h).sqrt();
+        4.0 / std::f64::consts::PI * (1.0 / side) * (1.0 / side).atan()
+    };
+    for (found, expected) in [(sum.at(1.0), known(0.5)), (sum.at(2.0), known(0.5) + known(0.6))] {
+        assert!((found - expected).abs() < 1e-4, "{found}, expected {expected}");
+    }
+    assert_eq!(ours.at(2.0), 1.0);
+    // A grid of 100² rays misjudges those at the square's edge.
+    assert!(rays.points.iter().all(|p| (p[1] - known(0.5)).abs() < 5e-3), "{rays:?}");
+    let one = stacked::Plan { squares: vec![1], edge: 50 };
+    let one = stacked::run(&one, &mut |_| ()).unwrap();
+    assert!(one.ours == Ours::Holds && !one.control_fails, "one square shows nothing: {}", one.sentence);
+}
+
+/// Of 1, 4, 16, … quads .177, .130, .098, .076, .062, .053, rays .136, as an independent computation has them.
+#[test]
+fn a_wall_hides_less_by_volumes_the_more_finely_it_is_divided() {
+    let finding = tessellation::run(&tessellation::Plan::of(Effort::Quick), &mut |_| ()).unwrap();
+    assert!(finding.ours == Ours::Limited && finding.control_fails, "{}", finding.sentence);
+    let printed = [0.177, 0.130, 0.098, 0.076, 0.062, 0.053, 0.136];
+    let [quads, rays] = ["AOV, a quad", "rays"].map(|name| &curve(&finding, 0, name).points);
+    for (found, expected) in quads.iter().chain(rays).zip(printed) {
+        assert!((found[1] / expected - 1.0).abs() < 0.02, "{} {expected}", found[1]);
+    }
+    let whole = tessellation::Plan { parts: vec![1], edge: 50 };
+    let whole = tessellation::run(&whole, &mut |_| ()).unwrap();
+    assert!(whole.ours == Ours::Holds && !whole.control_fails, "{}", whole.sentence);
+}
+
+/// Times are the machine's: what is held to is the work.
+#[test]
+fn a_pixel_lies_in_more_volumes_the_farther_they_reach() {
+    let gpu = open();
+    let finding = overdraw::run(&gpu, &overdraw::Plan::of(Effort::Quick), &mut |_| ()).unwrap();
+    assert!(finding.ours == Ours::Limited && finding.control_fails, "{}", finding.sentence);
+    let volumes = curve(&finding, 0, "AOV");
+    assert!(volumes.at(2.0) > 4.0 * volumes.at(0.5) && volumes.at(0.5) > 1.0, "{}", finding.sentence);
+    let still = overdraw::Plan { reaches: vec![1.0], size: [8, 8], ..overdraw::Plan::of(Effort::Quick) };
+    let still = overdraw::run(&gpu, &still, &mut |_| ()).unwrap();
+    assert!(still.ours == Ours::Holds && !still.control_fails, "one reach shows nothing: {}", still.sentence);
+    close(gpu);
 }

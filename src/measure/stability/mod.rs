@@ -13,24 +13,29 @@ pub mod dilation;
 pub mod labels;
 pub mod layers;
 pub mod map;
+pub mod mesh_stereo;
 pub mod mip_blocks;
 pub mod motion;
 pub mod network;
 pub mod noise;
 pub mod numbers;
 pub mod off_screen;
+pub mod overdraw;
 pub mod page;
 pub mod pixels;
 mod plane_cut;
 mod progressive;
+mod quads;
 pub mod radius;
 pub mod shape;
 pub mod sheets;
 pub mod shells;
 pub mod slope;
+pub mod stacked;
 pub mod stacked_layers;
 pub mod stereo;
 pub mod tables;
+pub mod tessellation;
 pub mod thin_sheets;
 pub mod views;
 
@@ -202,7 +207,7 @@ pub struct Trial {
 }
 
 /// Every trial, in the order of measure.md §4.
-pub const TRIALS: [Trial; 25] = [
+pub const TRIALS: [Trial; 29] = [
     Trial {
         name: "stereo",
         title: "Do both eyes see the same shading?",
@@ -327,6 +332,26 @@ pub const TRIALS: [Trial; 25] = [
         name: "slope",
         title: "Does a plane occlude itself when it is seen aslant?",
         run: |_, effort, progress| slope::run(&slope::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "mesh-stereo",
+        title: "Do both eyes see the same occlusion of a mesh?",
+        run: |gpu, effort, progress| mesh_stereo::run(gpu, &mesh_stereo::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "stacked",
+        title: "Do surfaces that no light reaches darken a point in front of the first?",
+        run: |_, effort, progress| stacked::run(&stacked::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "tessellation",
+        title: "Does a wall hide less the more finely it is divided?",
+        run: |_, effort, progress| tessellation::run(&tessellation::Plan::of(effort), progress),
+    },
+    Trial {
+        name: "overdraw",
+        title: "How does the work of occlusion volumes grow with their reach?",
+        run: |gpu, effort, progress| overdraw::run(gpu, &overdraw::Plan::of(effort), progress),
     },
 ];
 
