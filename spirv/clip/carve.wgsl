@@ -1,6 +1,8 @@
 // Opacity after transfer function and clips, in place: V_o is compared with what it was, so that whatever the edit, only
 // bricks whose opacity really changed count as changed (method.md section 5, contextual update from change).
 //
+// Solids fill what is in none of the volume's own matter: V_o is the larger of both. They are not drawn.
+//
 // `list_bricks` finds the bricks that an edit can have changed: those with opacity then or now that a clip's surface crosses, or that a
 // clip hid and no longer hides, or all if the values or the transfer function changed. `main` computes them.
 
@@ -14,7 +16,15 @@ struct CarveParams {
     levels: f32,
     slope: f32,
     bias: f32,
+    // 1: there are solids; 1: clips leave them whole
+    solids: u32,
+    solids_spared: u32,
     sampling: Sampling,
+}
+
+// Whether each brick has some of a solid.
+struct SolidBricks {
+    any: array<u32>,
 }
 
 #include "shared/change.wgsl"
@@ -38,6 +48,8 @@ var<immediate> params: CarveParams;
 @group(0) @binding(11) var<storage, read> list: BrickList;
 @group(0) @binding(13) var<uniform> features: Features;
 @group(0) @binding(14) var feature_index: texture_3d<u32>;
+@group(0) @binding(15) var solid: texture_3d<f32>;
+@group(0) @binding(16) var<storage, read> solid_bricks: SolidBricks;
 @group(0) @binding(12) var opacity: texture_storage_3d<r16unorm, read_write>;
 
 #include "shared/clip_opacity.wgsl"
@@ -54,7 +66,8 @@ fn concerned(index: u32) -> bool {
     clip_bricks_before.code[index] = now;
     let cut = ((now | before) & CUTTING) != 0u;
     let edited = params.all == 1u || cut || now != before;
-    return edited && (occupancy.visible[index] != 0u || contact.bits[index] != 0u);
+    let fills = params.solids == 1u && solid_bricks.any[index] != 0u;
+    return edited && (fills || occupancy.visible[index] != 0u || contact.bits[index] != 0u);
 }
 
 // One invocation a brick.
@@ -114,9 +127,18 @@ fn main(
         if listed && all(voxel < params.dims) {
             let centre = (vec3<f32>(voxel) - 0.5 * vec3<f32>(params.dims - 1u)) * params.spacing;
             var value = opacity_of(value_of(voxel));
-            if value > 0.0 && !is_spared(voxel) {
-                value *= visible_share(code, centre, params.spacing, params.sampling);
+            var filled = 0.0;
+            if params.solids == 1u {
+                filled = textureLoad(solid, voxel, 0).r;
             }
+            let spared = is_spared(voxel);
+            let cut_solid = filled > 0.0 && params.solids_spared == 0u;
+            if (value > 0.0 && !spared) || cut_solid {
+                let left = visible_share(code, centre, params.spacing, params.sampling);
+                value *= select(left, 1.0, spared);
+                filled *= select(1.0, left, cut_solid);
+            }
+            value = max(value, filled);
             let now = u32(round(value * PARTS));
             let stored = u32(round(textureLoad(opacity, voxel).r * PARTS));
             if now != stored {

@@ -2,8 +2,8 @@
 //
 //   L = A k_a c + A' (k_d c d + k_s s)     A = min(gain/2 accessibility V_AO, 1) where it is shown, else 1; the rest as in shading.wgsl
 //
-// V_AO is the volume's ambient factor a voxel in front of the surface, 1 outside the volume and without one: what the volume hides of all
-// directions is taken for what it hides of those in front.
+// V_AO is the volume's ambient factor a voxel in front of the surface, of what it is in the open: 1, or one half where the volume's opacities know
+// the surface as a solid; 1 outside the volume and without one. What hides some of all directions is taken for what it hides of those in front.
 //
 // Half the accessibility is the share of all directions that is open, which the gain of volumes is for: a flat wall's is 1/2 there too.
 // `ends` is for a volume's rays, which end at the surface; `over` lays what they gave over it.
@@ -34,6 +34,8 @@ struct LightParams {
     spacing_y: f32,
     spacing_z: f32,
     texels: u32,
+    // V_AO in the open
+    open: f32,
 }
 
 // One factor; red, green, blue; the factors of four parts, of which the least counts.
@@ -80,7 +82,7 @@ fn volume_factor(index: u32, eye: Eye, pixel: vec2<u32>) -> vec3<f32> {
     if any(place < vec3(0.0)) || any(place > vec3(1.0)) {
         return vec3(1.0);
     }
-    let texel = textureSampleLevel(ambient, edge, place, 0.0);
+    let texel = min(textureSampleLevel(ambient, edge, place, 0.0) / params.open, vec4(1.0));
     switch params.texels {
         case COLOURED: {
             return texel.rgb;

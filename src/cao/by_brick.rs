@@ -240,6 +240,7 @@ impl<G: Gather> ByBrick<G> {
                     transfer,
                     features: &on.features,
                     clips: &on.clip_set,
+                    solids: &on.solids,
                     clip_bricks: &v.clip_bricks,
                     clip_bricks_before: &v.clip_bricks_before,
                     occupancy: &on.occupancy,

@@ -86,6 +86,11 @@ pub(crate) fn map_radius(on: &Subject) -> Option<f32> {
     (maker(on).map_radius)(on)
 }
 
+/// Whether its opacities take in solids: those of methods that find what changed in the opacities themselves.
+pub(crate) fn takes_solids(on: &Subject) -> bool {
+    map_radius(on).is_none()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

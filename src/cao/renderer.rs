@@ -26,7 +26,7 @@ use crate::method;
 use crate::subject::Subject;
 use crate::{Error, Result};
 use cao_gpu::{Access, Buffer, Format, Gpu, Image};
-use cao_model::clip::Clip;
+use cao_model::clip::{Clip, Mode};
 use cao_model::feature::Features;
 use cao_model::light::AmbientLight;
 use cao_model::network::Network;
@@ -56,6 +56,9 @@ pub use read_back::StereoImage;
 fn kept(one: &Setup, other: &Setup) -> bool {
     one.method == other.method && one.coloured() == other.coloured()
 }
+
+/// What methods say that find what changed by clips alone.
+const NO_SOLIDS: &str = "lao and cao take no solids, as their updates look at clips alone; choose rays or another, or take the solids away";
 
 /// Renders one volume.
 pub struct Renderer {
@@ -161,7 +164,10 @@ impl Renderer {
             self.subject.setup = setup;
         }
         self.subject.wanted = setup;
-        let planned = self.subject.planned_clips(method::map_radius(&self.subject));
+        let planned = match self.subject.solids.any && !method::takes_solids(&self.subject) {
+            true => Err(Error::refused("method", NO_SOLIDS)),
+            false => self.subject.planned_clips(method::map_radius(&self.subject)),
+        };
         let held = planned.and_then(|planned| {
             if !waits {
                 self.hold(&before.0)?;
@@ -253,6 +259,26 @@ impl Renderer {
             }
         }
         self.edited(Changed { clips: true, ..Changed::NOTHING });
+        Ok(())
+    }
+
+    /// Changes what fills the volume's opacity beside what is in it, up to [`Clip::MAX`] shapes at their poses: an implant, say, whose surface is drawn as
+    /// a mesh. Solids occlude and are not drawn; the next update computes what they affect and nothing else. `spared`: clips leave them whole. Uses the
+    /// device's queue and waits for it; on error everything stays as it was.
+    ///
+    /// # Errors
+    /// Methods `lao` and `cao`, whose updates look at clips alone; shapes that keep, and what [`Self::set_clips`] refuses.
+    pub fn set_solids(&mut self, solids: &[Clip], spared: bool) -> Result<()> {
+        if !solids.is_empty() && !method::takes_solids(&self.subject) {
+            return Err(Error::refused("solids", NO_SOLIDS));
+        }
+        if let Some(solid) = solids.iter().find(|solid| solid.mode == Mode::Keep) {
+            let problem =
+                format!("{}: expected the mode remove, by which its inside counts", solid.shape.name());
+            return Err(Error::refused("solid", problem));
+        }
+        self.subject.solids = self.subject.solids_of(solids, spared)?;
+        self.edited(Changed { opacities: true, ..Changed::NOTHING });
         Ok(())
     }
 

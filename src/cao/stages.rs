@@ -24,6 +24,8 @@ pub const CLIPS: Stage = Stage::new("clips", Phase::Clip);
 pub const CLASSIFY: Stage = Stage::new("classify", Phase::Clip);
 /// V_o in place, and what changed.
 pub const CARVE: Stage = Stage::new("carve", Phase::Clip);
+/// What solids fill of each voxel.
+pub const SOLIDS: Stage = Stage::new("solids", Phase::Clip);
 /// The bricks to work on.
 pub const BRICKS: Stage = Stage::new("bricks", Phase::Ambient);
 /// Rays of all voxels.

@@ -5,6 +5,7 @@ use crate::clip::clip_bricks::ClipBricks;
 use crate::clip::clips::ClipSet;
 use crate::clip::dilate::Dilate;
 use crate::clip::peel::Peel;
+use crate::clip::solid::{Solid, Solids};
 use crate::drive::Part;
 use crate::field::Field;
 use crate::field::features::{Classes, FeatureSet};
@@ -15,7 +16,7 @@ use cao_gpu::{Access, Buffer, BufferUse, Gpu, Recorder, Timings};
 use cao_model::clip::Clip;
 use cao_model::feature::Features;
 use cao_model::network::Network;
-use cao_model::settings::Setup;
+use cao_model::settings::{AntiAliasing, Setup};
 use cao_model::transfer::TransferFunction;
 use cao_model::volume::Volume;
 use glam::Vec3;
@@ -36,6 +37,8 @@ pub struct Subject {
     pub features: FeatureSet,
     /// The clips, as kernels read them.
     pub clip_set: ClipSet,
+    /// What fills opacity beside what the volume has.
+    pub solids: Solids,
     /// How V_AO is computed: by the last update that began.
     pub setup: Setup,
     /// How the next one is to compute it; the same unless an update spans frames.
@@ -64,6 +67,7 @@ impl Subject {
             transfer_buffer: TransferBuffer::new(gpu)?,
             features: FeatureSet::new(gpu, &field, Features::NONE)?,
             clip_set: ClipSet::new(gpu)?,
+            solids: Solids::none(gpu)?,
             ambient_mm: transfer.reference_mm(f64::from(field.min_spacing())),
             setup,
             wanted: setup,
@@ -108,6 +112,27 @@ impl Subject {
     /// Makes them. Uses the device's queue only where there is one to make.
     pub(crate) fn make_clip_maps(&mut self) -> Result<Timings> {
         self.clip_set.make(&self.gpu, &self.peel, &self.dilate)
+    }
+
+    /// Solids of these shapes, which clips leave whole where they are `spared`. Uses the device's queue and waits for it.
+    pub(crate) fn solids_of(&self, shapes: &[Clip], spared: bool) -> Result<Solids> {
+        if shapes.is_empty() {
+            return Solids::none(&self.gpu);
+        }
+        let (gpu, half_mm) = (&self.gpu, self.half_diagonal());
+        let mut set = ClipSet::new(gpu)?.planned(gpu, shapes, None, half_mm, self.wanted.maps)?;
+        set.make(gpu, &self.peel, &self.dilate)?;
+        let (solids, kernel) = (Solids::of(gpu, &self.field, spared)?, Solid::new(gpu)?);
+        let mut rec = gpu.recorder("solids")?;
+        set.record(&mut rec, shapes, half_mm)?;
+        rec.discard(&solids.solid);
+        rec.barrier(&[], &[Access::StorageWrite]);
+        rec.stage(stages::SOLIDS)?;
+        // As clips are sampled where nobody asks for more or less.
+        kernel.record(&mut rec, &self.field, AntiAliasing::N32, &set, &solids)?;
+        rec.end_stage()?;
+        rec.submit_and_wait()?;
+        Ok(solids)
     }
 
     /// What opacities before clipping come from: values, and the function that gives them opacity. With features the values are opacities

@@ -10,6 +10,7 @@
 //!     rotate_deg = [0, 0, 90]          # about the fixed axes x, then y, then z
 //!     scale = 0.5                      # or one number an axis: [1, 1, 2]
 //!     colour = "#c8b090"               # instead of the file's own; masks stay
+//!     solid = true                     # whether the volume's opacity knows it, which it then darkens; closed meshes only; default: false
 //!     spared = true                    # whether clips leave it whole; default: false
 //!     two_sided = true                 # whether backs are surfaces, too; default: as the file has it, docs/formats.md
 //!
@@ -56,6 +57,8 @@ pub struct MeshSource {
     pub two_sided: Option<bool>,
     /// Whether clips leave it whole.
     pub spared: bool,
+    /// Whether it fills the volume's opacity.
+    pub solid: bool,
 }
 
 /// Where a mesh comes from.
@@ -130,6 +133,8 @@ pub(crate) struct MeshFile {
     two_sided: Option<bool>,
     #[serde(default)]
     spared: bool,
+    #[serde(default)]
+    solid: bool,
 }
 
 impl MeshFile {
@@ -161,6 +166,7 @@ impl MeshFile {
             colour: self.colour.map(|colour| parse_colour(&of("colour"), &colour)).transpose()?,
             two_sided: self.two_sided,
             spared: self.spared,
+            solid: self.solid,
         })
     }
 }

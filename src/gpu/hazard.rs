@@ -41,6 +41,8 @@ struct State {
     pending: Vec<Pending>,
     /// Bytes of a buffer that may be indirect arguments: what the program wrote last there are numbers that every device can dispatch.
     dispatchable: Vec<Range<u64>>,
+    /// Whether this recording has written words of it: else what it knows of them is as old as its beginning.
+    worded: bool,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -212,6 +214,7 @@ impl Hazards {
     /// Notes that a copy, fill or update writes these bytes of a buffer, with numbers that can be dispatched or with others.
     pub fn words(&mut self, id: ResourceId, range: Range<u64>, dispatchable: bool) {
         let Some(state) = self.resources.get_mut(&id) else { return };
+        state.worded = true;
         let mut joined = range.clone();
         let mut parts = Vec::new();
         for Range { start, end } in state.dispatchable.drain(..) {
@@ -245,7 +248,10 @@ impl Hazards {
                 if state.lent {
                     state.undefined = recorded.undefined;
                 }
-                state.dispatchable.clone_from(&recorded.dispatchable);
+                // Another thread may have written them since this recording began.
+                if recorded.worded {
+                    state.dispatchable.clone_from(&recorded.dispatchable);
+                }
             }
         }
     }
@@ -255,7 +261,7 @@ impl Hazards {
         for (id, theirs) in recorded.resources {
             // A resource that is gone by now is no longer in `self`.
             if let Some(ours) = self.resources.get_mut(&id) {
-                *ours = theirs;
+                *ours = State { worded: false, ..theirs };
             }
         }
     }
@@ -456,5 +462,29 @@ mod tests {
         h.command("b", &[touch(SampledRead)]).unwrap_err();
         h.barrier(&[StorageWrite], &[StorageWrite]);
         h.command("c", &[touch(StorageWrite)]).unwrap();
+    }
+
+    /// Two threads: one recording begins, another writes arguments and ends, the first ends.
+    #[test]
+    fn a_recording_that_began_earlier_forgets_nothing_of_another() {
+        let mut gpu = state();
+        gpu.add_buffer(2);
+        let mut earlier = gpu.clone();
+        let mut later = gpu.clone();
+        later.words(1, 0..12, true);
+        gpu.commit_waited(&later);
+        assert!(gpu.may_dispatch(1, &(0..12)));
+        earlier.words(2, 0..12, true);
+        gpu.commit_waited(&earlier);
+        assert!(gpu.may_dispatch(1, &(0..12)) && gpu.may_dispatch(2, &(0..12)));
+        // What it wrote itself counts.
+        let mut last = gpu.clone();
+        last.words(1, 0..4, false);
+        gpu.commit_waited(&last);
+        assert!(!gpu.may_dispatch(1, &(0..12)));
+        let mut pending = gpu.clone();
+        pending.words(1, 0..12, true);
+        gpu.commit_pending(pending);
+        assert!(!gpu.clone().resources[&1].worded && gpu.may_dispatch(1, &(0..12)));
     }
 }

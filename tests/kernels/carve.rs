@@ -7,6 +7,7 @@ use cao::clip::clip_bricks::ClipBricks;
 use cao::clip::clips::ClipSet;
 use cao::clip::dilate::Dilate;
 use cao::clip::peel::Peel;
+use cao::clip::solid::Solids;
 use cao::field::Field;
 use cao::field::bricks::BrickList;
 use cao::field::features::{Classes, FeatureSet};
@@ -34,6 +35,7 @@ struct Bench<'a> {
     gpu: &'a Gpu,
     field: Field,
     set: ClipSet,
+    solids: Solids,
     half_mm: f32,
     function: TransferFunction,
     transfer: TransferBuffer,
@@ -61,6 +63,7 @@ impl<'a> Bench<'a> {
         };
         Self {
             set: ClipSet::new(gpu).unwrap(),
+            solids: Solids::none(gpu).unwrap(),
             half_mm: 0.5 * size_mm(grid).length(),
             function: identity(),
             transfer: TransferBuffer::new(gpu).unwrap(),
@@ -114,6 +117,7 @@ impl<'a> Bench<'a> {
                 transfer: by,
                 features: &self.features,
                 clips: &self.set,
+                solids: &self.solids,
                 clip_bricks: &self.words[0],
                 clip_bricks_before: &self.words[1],
                 occupancy: &self.occupancy,

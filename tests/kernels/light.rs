@@ -42,7 +42,7 @@ fn pictures_are_lit_as_the_twin_lights_them() {
     let texels: Vec<f32> = (0..128).map(|i| factor(i % 8)).collect();
     let ambient = volume_of(&gpu, "ambient", dims, Format::R32Float).unwrap();
     write_image(&gpu, &ambient, bytemuck::cast_slice(&texels));
-    let shade = VolumeShade { ambient: &ambient, coloured: false, spacing: [20.0, 50.0, 50.0] };
+    let shade = VolumeShade { ambient: &ambient, coloured: false, spacing: [20.0, 50.0, 50.0], open: 0.8 };
     for occluded in [Occluded::Ambient, Occluded::All] {
         let look = Look { occluded, two_sided: true, ..Look::default() };
         run(&gpu, |rec| {
@@ -76,7 +76,7 @@ fn pictures_are_lit_as_the_twin_lights_them() {
                 let expected = lit(&world, shown, open, &look, towards, position);
                 let air = shown.place + 20.0 * shown.normal;
                 let inside = (air / DVec3::new(80.0, 100.0, 100.0)).abs().max_element() <= 1.0;
-                let factor = if inside { ((air.x / 20.0 + 3.5) / 7.0).clamp(0.0, 1.0) } else { 1.0 };
+                let factor = if inside { ((air.x / 20.0 + 3.5) / 7.0 / 0.8).clamp(0.0, 1.0) } else { 1.0 };
                 let shaded = lit(&world, shown, open * factor, &look, towards, position);
                 let [a, b] = eye.depth_terms().map(f64::from);
                 let wrong = |found: f32, expected: f64| (f64::from(found) - expected).abs() > ERROR;

@@ -47,6 +47,7 @@ mod reference;
 mod resize;
 mod shading;
 mod shares;
+mod solid;
 mod ssao;
 mod sums;
 mod tiles;

@@ -42,6 +42,20 @@ fn meshes_stand_in_volumes_and_are_cut_with_them() {
     let (whole, cut) = (picture("whole.png"), picture("cut.png"));
     let changed = whole.iter().zip(&cut).filter(|(a, b)| a.abs_diff(**b) > 20).count();
     assert!(changed > 100, "{changed}");
+    // A solid one darkens the volume around it.
+    let torus = |more: &str| {
+        format!(
+            "volume = \"builtin:engine:24\"\n[[mesh]]\nfile = \"cube.obj\"\nscale = 5\ntranslate_mm = [6, -6, 6]\n{more}[image]\nwidth = 48\nheight = 48\n"
+        )
+    };
+    folder.put("cube.obj", crate::support::cube_obj(6));
+    folder.put("plain.toml", torus("")).put("solid.toml", torus("solid = true\n"));
+    folder.json("render plain.toml -o plain.png");
+    folder.json("render solid.toml -o solid.png");
+    assert_ne!(picture("plain.png"), picture("solid.png"));
+    folder.put("lone.toml", "[[mesh]]\nbuiltin = \"house\"\ndetail = 1\nsolid = true\n");
+    let refused = folder.run("render lone.toml -o x.png");
+    assert!(refused.code == Some(2) && refused.err.contains("no volume"), "{}", refused.err);
     let refused = folder.run("render whole.toml -o x.png --budget-ms 10");
     assert!(refused.code == Some(2) && refused.err.contains("this scene has meshes"), "{}", refused.err);
 }

@@ -30,4 +30,5 @@ mod reach;
 mod real_data;
 mod samples;
 mod scenes;
+mod solids;
 mod stability;

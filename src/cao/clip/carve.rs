@@ -9,6 +9,7 @@
 
 use crate::clip::clips::ClipSet;
 use crate::clip::positions;
+use crate::clip::solid::Solids;
 use crate::field::Field;
 use crate::field::bricks::BrickList;
 use crate::field::features::FeatureSet;
@@ -32,6 +33,8 @@ pub struct Bindings<'a> {
     pub clip_bricks: &'a Buffer,
     /// The same at the last call.
     pub clip_bricks_before: &'a Buffer,
+    /// What fills opacity beside.
+    pub solids: &'a Solids,
     /// Bricks that can have opacity.
     pub occupancy: &'a Buffer,
     /// Where each brick's opacity lies.
@@ -80,6 +83,8 @@ impl Carve {
             levels,
             slope,
             bias,
+            solids: u32::from(b.solids.any),
+            solids_spared: u32::from(b.solids.spared),
             sampling: positions::sampling(samples),
             pad: Default::default(),
         };
@@ -90,6 +95,7 @@ impl Carve {
             clip_bricks_before: b.clip_bricks_before,
             occupancy: b.occupancy,
             contact: b.contact,
+            solid_bricks: &b.solids.bricks,
             growing: &b.list.buffer,
         };
         let groups = rows_over(field.brick_count(), kernel::LIST_BRICKS_WORKGROUP);
@@ -110,6 +116,7 @@ impl Carve {
             contact: b.contact,
             change: b.change,
             list: &b.list.buffer,
+            solid: &b.solids.solid,
             opacity: b.opacity,
         };
         rec.dispatch_indirect(&self.carve, &binds, params, &b.list.buffer, 0)

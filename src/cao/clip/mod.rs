@@ -8,3 +8,4 @@ pub mod dilate;
 pub mod pairs;
 pub mod peel;
 mod positions;
+pub mod solid;

@@ -28,6 +28,8 @@ pub struct VolumeShade<'a> {
     pub coloured: bool,
     /// Size of a voxel in mm.
     pub spacing: [f32; 3],
+    /// What it is in the open: 1, or ½ where its opacities know the surface as a solid.
+    pub open: f32,
 }
 
 /// What is lit.
@@ -94,10 +96,11 @@ impl Light {
             ..bytemuck::Zeroable::zeroed()
         };
         let extent = [width, height, geometry.views() as u32];
-        if let Some(VolumeShade { ambient, coloured, spacing }) = volume {
+        if let Some(VolumeShade { ambient, coloured, spacing, open }) = volume {
             let dims = ambient.desc().dims.map(|voxels| voxels as f32);
             [params.dims_x, params.dims_y, params.dims_z] = dims;
             [params.spacing_x, params.spacing_y, params.spacing_z] = spacing;
+            params.open = open;
             params.texels = match (ambient.desc().format, coloured) {
                 (_, true) => kernel::COLOURED,
                 (Format::Rgba16Unorm, false) => kernel::PARTS_OF_FOUR,

@@ -56,7 +56,9 @@ impl Renderer {
     pub(crate) fn shade(&self) -> VolumeShade<'_> {
         let subject = &self.subject;
         let spacing = subject.field.spacing;
-        VolumeShade { ambient: self.ambient.fields().ambient, coloured: subject.coloured(), spacing }
+        // Half of all directions lie behind the surface of a solid.
+        let open = if subject.solids.any { 0.5 } else { 1.0 };
+        VolumeShade { ambient: self.ambient.fields().ambient, coloured: subject.coloured(), spacing, open }
     }
 
     /// As [`Self::record_picture`], all of it, with rays that end where the picture's depth says: view depths in mm.

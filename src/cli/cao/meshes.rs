@@ -9,14 +9,17 @@ use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
 use cao_formats::mesh_keys::{MeshFrom, MeshSource};
 use cao_formats::scene::{Scene, Stereo};
+use cao_model::clip::{Clip, Shape};
 use cao_model::frame::Turn;
 use cao_model::look::Look;
+use cao_model::mesh::TriangleMesh;
 use cao_model::settings::Scope;
 use cao_model::surface::{Instance, World};
 use cao_model::view::StereoRig;
 use cao_model::volume::Volume;
 use glam::Vec3;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Most pixels along the edge of one that are drawn for it: four are sixteen samples.
 const MOST_FINER: u32 = 4;
@@ -69,18 +72,25 @@ pub fn run(
             let transfer = args::transfer(transfer, &mut volume, &args.input)?;
             let features = args.parts.of(scene.features.clone(), &volume, scene.frame)?;
             let mut setup = scene.occlusion.setup(volume.min_spacing())?;
-            // Meshes stand where the volume has nothing, too.
-            setup.scope = Scope::All;
+            if scene.meshes.iter().any(|mesh| !mesh.solid) {
+                // Meshes stand where the volume has nothing, too; solids are something.
+                setup.scope = Scope::All;
+            }
             setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
             let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
             args.settings.give_network(&mut renderer)?;
             renderer.set_clips(&turn.clips(&scene.clips))?;
             renderer.set_features(features)?;
+            let (solids, spared) = solids(&scene)?;
+            renderer.set_solids(&turn.clips(&solids), spared)?;
             progress.stage("occlusion");
             timings.extend(renderer.update(&mut |done| progress.set(done))?);
             out.volume(&args.input, &volume);
             out.setup(renderer.setup(), &volume);
             Some(renderer)
+        }
+        None if scene.meshes.iter().any(|mesh| mesh.solid) => {
+            return Err(usage("mesh.solid: this scene has no volume whose opacity it could fill"));
         }
         None => None,
     };
@@ -106,6 +116,18 @@ pub fn run(
     }
     out.finish()?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The meshes that fill the volume's opacity, and whether clips leave all of them whole.
+fn solids(scene: &Scene) -> Result<(Vec<Clip>, bool)> {
+    let mut solids = Vec::new();
+    for source in scene.meshes.iter().filter(|source| source.solid) {
+        for Instance { surface, pose } in source.instances()? {
+            let mesh = TriangleMesh::new(&surface.name, &surface.positions, &surface.triangles)?;
+            solids.push(Clip { pose, ..Clip::remove(Shape::Mesh(Arc::new(mesh))) });
+        }
+    }
+    Ok((solids, scene.meshes.iter().all(|source| source.spared || !source.solid)))
 }
 
 /// The scene's eyes, or those of a built-in scene that stands alone; framed is the box of volume and meshes.

@@ -7,3 +7,4 @@ pub mod clips;
 pub mod dilate;
 pub mod pairs;
 pub mod peel;
+pub mod solid;
