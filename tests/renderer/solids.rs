@@ -43,7 +43,7 @@ fn every_method_takes_them_in_exactly_or_refuses_them() {
         renderer.update(&mut |_| ()).unwrap();
         let without = (renderer.read_opacity().unwrap(), renderer.read_ambient().unwrap());
         if matches!(method, Method::Lao | Method::Cao) {
-            let error = renderer.set_solids(&[ball.clone()], false).unwrap_err().to_string();
+            let error = renderer.set_solids(std::slice::from_ref(&ball), false).unwrap_err().to_string();
             assert!(error.contains("choose rays or another"), "{error}");
             continue;
         }
