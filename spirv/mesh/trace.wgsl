@@ -10,10 +10,8 @@
 
 struct TraceParams {
     size: vec2<u32>,
-    // the first pixel of this piece, counted over all views, and how many
-    first_pixel: u32,
+    // of all views
     pixels: u32,
-    views: u32,
     // the first ray of this piece, how many, and how many in all
     first_ray: u32,
     rays: u32,
@@ -47,11 +45,10 @@ const STEP_Y = 2447445414u;
 
 @compute @workgroup_size(64)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let item = (group.y * GROUPS_PER_ROW + group.x) * 64u + local;
-    if item >= params.pixels {
+    let index = (group.y * GROUPS_PER_ROW + group.x) * 64u + local;
+    if index >= params.pixels {
         return;
     }
-    let index = params.first_pixel + item;
     let pixels = params.size.x * params.size.y;
     let here = geometry.pixel[index];
     if here.w == 0.0 {

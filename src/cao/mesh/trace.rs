@@ -54,9 +54,7 @@ impl Trace {
         let pixels = size[0] * size[1] * geometry.views() as u32;
         let params = kernel::TraceParams {
             size,
-            first_pixel: 0,
             pixels,
-            views: geometry.views() as u32,
             first_ray: some.start,
             rays: some.len() as u32,
             all_rays: all,
