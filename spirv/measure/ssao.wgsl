@@ -24,11 +24,11 @@ var<immediate> params: SsaoParams;
 @group(0) @binding(0) var depth: texture_depth_2d;
 @group(0) @binding(1) var<storage, read_write> occlusion: Occlusion;
 
-// Uniform in [0, 1) of an integer (PCG's output permutation).
+#include "shared/hash.wgsl"
+
+// Uniform in [0, 1) of an integer.
 fn hash(value: u32) -> f32 {
-    let state = value * 747796405u + 2891336453u;
-    let word = ((state >> ((state >> 28u) + 4u)) ^ state) * 277803737u;
-    return f32(((word >> 22u) ^ word) >> 8u) / 16777216.0;
+    return f32(scrambled(value) >> 8u) / 16777216.0;
 }
 
 const TAU = 6.28318530718;

@@ -51,6 +51,8 @@ pub struct Subject {
     pub(crate) clips: Vec<Clip>,
     classes: Classes,
     occupancy_kernel: Occupancy,
+    /// What fills solids, and their shapes on the device, once there was one.
+    solid_kernel: Option<(Solid, ClipSet)>,
     peel: Peel,
     dilate: Dilate,
 }
@@ -77,6 +79,7 @@ impl Subject {
             classes: Classes::new(gpu)?,
             values: 0,
             occupancy_kernel: Occupancy::new(gpu)?,
+            solid_kernel: None,
             peel: Peel::new(gpu)?,
             dilate: Dilate::new(gpu)?,
             field,
@@ -115,14 +118,19 @@ impl Subject {
     }
 
     /// Solids of these shapes, which clips leave whole where they are `spared`. Uses the device's queue and waits for it.
-    pub(crate) fn solids_of(&self, shapes: &[Clip], spared: bool) -> Result<Solids> {
+    pub(crate) fn solids_of(&mut self, shapes: &[Clip], spared: bool) -> Result<Solids> {
         if shapes.is_empty() {
             return Solids::none(&self.gpu);
         }
         let (gpu, half_mm) = (&self.gpu, self.half_diagonal());
-        let mut set = ClipSet::new(gpu)?.planned(gpu, shapes, None, half_mm, self.wanted.maps)?;
+        // Kept from the first solid on: what moves is not peeled again, and nothing is compiled again.
+        let (kernel, kept) = match &mut self.solid_kernel {
+            Some(kept) => kept,
+            none => none.insert((Solid::new(gpu)?, ClipSet::new(gpu)?)),
+        };
+        let mut set = kept.planned(gpu, shapes, None, half_mm, self.wanted.maps)?;
         set.make(gpu, &self.peel, &self.dilate)?;
-        let (solids, kernel) = (Solids::of(gpu, &self.field, spared)?, Solid::new(gpu)?);
+        let solids = Solids::of(gpu, &self.field, spared)?;
         let mut rec = gpu.recorder("solids")?;
         set.record(&mut rec, shapes, half_mm)?;
         rec.discard(&solids.solid);
@@ -132,6 +140,7 @@ impl Subject {
         kernel.record(&mut rec, &self.field, AntiAliasing::N32, &set, &solids)?;
         rec.end_stage()?;
         rec.submit_and_wait()?;
+        *kept = set;
         Ok(solids)
     }
 

@@ -334,8 +334,9 @@ impl TriangleMesh {
 /// Moments of the winding number that are looked at.
 const MOMENTS: usize = 8;
 
-fn bounds_of(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
-    points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+/// Smallest and largest coordinates.
+pub fn bounds_of(points: impl IntoIterator<Item = Vec3>) -> (Vec3, Vec3) {
+    points.into_iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
 }
 
 /// Root of a vertex in the union-find forest, halving the path on the way.

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec2, Vec3};
 
 use crate::clip::Pose;
+use crate::mesh::bounds_of;
 use crate::{Error, Result};
 
 /// A triangle mesh as files have it.
@@ -185,11 +186,6 @@ impl Surface {
     pub fn bounds(&self) -> (Vec3, Vec3) {
         bounds_of(self.positions.iter().copied())
     }
-}
-
-/// Smallest and largest coordinates.
-pub fn bounds_of(points: impl IntoIterator<Item = Vec3>) -> (Vec3, Vec3) {
-    points.into_iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
 }
 
 impl Texture {

@@ -251,7 +251,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/model/methods.rs", &["error", "light", "occlusion", "options"]),
     ("src/model/settings.rs", &["error", "light", "methods", "occlusion", "options"]),
     ("src/model/clip.rs", &["error", "mesh"]),
-    ("src/model/surface.rs", &["clip", "error"]),
+    ("src/model/surface.rs", &["clip", "error", "mesh"]),
     ("src/model/bvh.rs", &[]),
     ("src/model/pixel_occlusion.rs", &["error"]),
     ("src/model/scenes/", &["bvh", "clip", "error", "mesh", "surface", "view"]),

@@ -13,8 +13,9 @@ use cao_gpu::{Access, Buffer, Gpu};
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
 use cao_model::clip::Clip;
+use cao_model::mesh::bounds_of;
 use cao_model::settings::MapSettings;
-use cao_model::surface::{Triangle, World, bounds_of};
+use cao_model::surface::{Triangle, World};
 use glam::Vec3;
 
 /// A world's triangles on the device.
@@ -38,6 +39,7 @@ pub struct Surfaces {
     /// and whether their backs are surfaces too.
     pub two_sided: Vec<bool>,
     nodes: Vec<Node>,
+    share_out: Shares,
     /// Half the diagonal of a box about the origin that holds them all.
     half_mm: f32,
 }
@@ -94,6 +96,7 @@ impl Surfaces {
             shares: device_buffer(gpu, "shares", bytemuck::cast_slice(&whole))?,
             clips,
             half_mm,
+            share_out: Shares::new(gpu)?,
             tree: device_buffer(gpu, "tree", bytemuck::cast_slice(&packed(&bvh.nodes)))?,
             triangles: device_buffer(gpu, "triangles", bytemuck::cast_slice(&triangles))?,
             looks: device_buffer(gpu, "looks", bytemuck::cast_slice(&looks))?,
@@ -115,11 +118,10 @@ impl Surfaces {
         if planned.has_todo() {
             planned.make(gpu, &Peel::new(gpu)?, &Dilate::new(gpu)?)?;
         }
-        let shares = Shares::new(gpu)?;
         let mut rec = gpu.recorder("clips of meshes")?;
         planned.record(&mut rec, clips, self.half_mm)?;
         rec.barrier(&[Access::StorageRead], &[Access::StorageWrite]);
-        shares.record(&mut rec, &self.triangles, &planned, &self.shares)?;
+        self.share_out.record(&mut rec, &self.triangles, &planned, &self.shares)?;
         rec.submit_and_wait()?;
         self.clips = planned;
         Ok(())

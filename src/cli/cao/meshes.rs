@@ -31,10 +31,8 @@ pub fn run(
     targets: &Targets,
     mut progress: Progress,
 ) -> Result<ExitCode> {
-    let instances =
-        scene.meshes.iter().map(MeshSource::instances).collect::<cao_formats::Result<Vec<_>>>()?;
-    let instances: Vec<Instance> = instances.into_iter().flatten().collect();
-    let world = World::new(&instances)?;
+    let of_each = scene.meshes.iter().map(MeshSource::instances).collect::<cao_formats::Result<Vec<_>>>()?;
+    let world = World::new(&of_each.concat())?;
     if args.budget.given() {
         return Err(usage(
             "--budget-error, --budget-ms: they choose a volume's occlusion, and this scene has meshes",
@@ -81,7 +79,7 @@ pub fn run(
             args.settings.give_network(&mut renderer)?;
             renderer.set_clips(&turn.clips(&scene.clips))?;
             renderer.set_features(features)?;
-            let (solids, spared) = solids(&scene)?;
+            let (solids, spared) = solids(&scene, &of_each)?;
             renderer.set_solids(&turn.clips(&solids), spared)?;
             progress.stage("occlusion");
             timings.extend(renderer.update(&mut |done| progress.set(done))?);
@@ -119,12 +117,12 @@ pub fn run(
 }
 
 /// The meshes that fill the volume's opacity, and whether clips leave all of them whole.
-fn solids(scene: &Scene) -> Result<(Vec<Clip>, bool)> {
+fn solids(scene: &Scene, of_each: &[Vec<Instance>]) -> Result<(Vec<Clip>, bool)> {
     let mut solids = Vec::new();
-    for source in scene.meshes.iter().filter(|source| source.solid) {
-        for Instance { surface, pose } in source.instances()? {
+    for (_, instances) in scene.meshes.iter().zip(of_each).filter(|(source, _)| source.solid) {
+        for Instance { surface, pose } in instances {
             let mesh = TriangleMesh::new(&surface.name, &surface.positions, &surface.triangles)?;
-            solids.push(Clip { pose, ..Clip::remove(Shape::Mesh(Arc::new(mesh))) });
+            solids.push(Clip { pose: *pose, ..Clip::remove(Shape::Mesh(Arc::new(mesh))) });
         }
     }
     Ok((solids, scene.meshes.iter().all(|source| source.spared || !source.solid)))

@@ -186,7 +186,7 @@ mod tests {
     const OFF_SCREEN: &str = "off screen";
 
     fn tree(world: &World) -> Bvh {
-        let bounds = |t: &Triangle| crate::surface::bounds_of(t.corners);
+        let bounds = |t: &Triangle| crate::mesh::bounds_of(t.corners);
         Bvh::new(&world.triangles.iter().map(bounds).collect::<Vec<_>>())
     }
 
