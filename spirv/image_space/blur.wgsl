@@ -33,7 +33,7 @@ fn square(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let index = pixel_index(params.size, id.z, id.xy);
     if geometry.pixel[index].w <= 0.0 {
-        accessibility.value[index] = 1.0;
+        accessibility.pixel[index] = 1.0;
         return;
     }
     var sum = 0.0;
@@ -41,11 +41,11 @@ fn square(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var i = 0; i < 16; i++) {
         let pixel = vec2<i32>(id.xy) + vec2(i % 4, i / 4) - 2;
         if inside(pixel) {
-            sum += unfiltered.value[pixel_index(params.size, id.z, vec2<u32>(pixel))];
+            sum += unfiltered.pixel[pixel_index(params.size, id.z, vec2<u32>(pixel))];
             count += 1.0;
         }
     }
-    accessibility.value[index] = sum / count;
+    accessibility.pixel[index] = sum / count;
 }
 
 @compute @workgroup_size(8, 8)
@@ -56,7 +56,7 @@ fn bilateral(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = pixel_index(params.size, id.z, id.xy);
     let here = geometry.pixel[index];
     if here.w <= 0.0 {
-        accessibility.value[index] = 1.0;
+        accessibility.pixel[index] = 1.0;
         return;
     }
     let eye = eyes.eye[id.z];
@@ -65,7 +65,7 @@ fn bilateral(@builtin(global_invocation_id) id: vec3<u32>) {
     let nearness = -2.0 / max(f32(params.reach * params.reach), 1.0);
     let flatness = -0.5 / (params.thickness * params.thickness);
     // The pixel itself.
-    var sum = unfiltered.value[index];
+    var sum = unfiltered.pixel[index];
     var weights = 1.0;
     for (var i = -params.reach; i <= params.reach; i++) {
         let pixel = vec2<i32>(id.xy) + i * params.step;
@@ -82,8 +82,8 @@ fn bilateral(@builtin(global_invocation_id) id: vec3<u32>) {
         let squared = alike * alike;
         let fourth = squared * squared;
         let weight = exp(nearness * f32(i * i) + flatness * off * off) * fourth * fourth;
-        sum += weight * unfiltered.value[other];
+        sum += weight * unfiltered.pixel[other];
         weights += weight;
     }
-    accessibility.value[index] = sum / weights;
+    accessibility.pixel[index] = sum / weights;
 }

@@ -48,7 +48,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = pixel_index(params.size, id.z, id.xy);
     let depth = geometry.pixel[index].w;
     if depth <= 0.0 {
-        accessibility.value[index] = 1.0;
+        accessibility.pixel[index] = 1.0;
         return;
     }
     let eye = eyes.eye[id.z];
@@ -63,5 +63,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let hides = at.z > 0.0 && shown > 0.0 && shown < at.z && at.z - shown <= params.radius;
         hidden += u32(hides);
     }
-    accessibility.value[index] = 1.0 - f32(hidden) / f32(2u * PAIRS);
+    accessibility.pixel[index] = 1.0 - f32(hidden) / f32(2u * PAIRS);
 }

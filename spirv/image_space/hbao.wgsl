@@ -43,7 +43,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = pixel_index(params.size, id.z, id.xy);
     let here = geometry.pixel[index];
     if here.w <= 0.0 {
-        accessibility.value[index] = 1.0;
+        accessibility.pixel[index] = 1.0;
         return;
     }
     let eye = eyes.eye[id.z];
@@ -82,5 +82,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
         }
     }
-    accessibility.value[index] = clamp(1.0 - sum / f32(params.directions), 0.0, 1.0);
+    accessibility.pixel[index] = clamp(1.0 - sum / f32(params.directions), 0.0, 1.0);
 }

@@ -26,7 +26,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let index = pixel_index(params.size, id.z, id.xy);
     let here = geometry.pixel[index];
     if here.w <= 0.0 {
-        accessibility.value[index] = 1.0;
+        accessibility.pixel[index] = 1.0;
         return;
     }
     let eye = eyes.eye[id.z];
@@ -50,5 +50,5 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         free += select(2.0 * half, clamp(shown - at.z + half, 0.0, 2.0 * half), seen);
         whole += 2.0 * half;
     }
-    accessibility.value[index] = free / whole;
+    accessibility.pixel[index] = free / whole;
 }

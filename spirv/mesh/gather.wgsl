@@ -7,7 +7,8 @@
 
 #include "shared/geometry.wgsl"
 #include "shared/occluder.wgsl"
-#include "shared/failed.wgsl"
+#include "shared/accessibility.wgsl"
+#include "shared/sparse.wgsl"
 
 struct GatherParams {
     // pixels of a view, and blocks
@@ -20,16 +21,6 @@ struct GatherParams {
     rows: u32,
     // mm: how far occlusion reaches
     delta: f32,
-}
-
-struct Accessibility {
-    // for each pixel 1 - AO
-    pixel: array<f32>,
-}
-
-struct Sparse {
-    // for each block, view after view, the sum over all triangles
-    block: array<f32>,
 }
 
 var<immediate> params: GatherParams;

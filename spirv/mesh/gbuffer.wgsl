@@ -3,16 +3,11 @@
 
 #include "shared/geometry.wgsl"
 #include "shared/ray.wgsl"
+#include "shared/hits.wgsl"
 
 struct GbufferParams {
     // pixels of a view
     size: vec2<u32>,
-}
-
-struct Hits {
-    // for each pixel the triangle that is seen, NO_TRIANGLE where none is, and where on it: weights of the second and the third
-    // corner, 16 bits each
-    pixel: array<vec2<u32>>,
 }
 
 var<immediate> params: GbufferParams;

@@ -10,6 +10,8 @@
 
 #include "shared/geometry.wgsl"
 #include "shared/surface.wgsl"
+#include "shared/accessibility.wgsl"
+#include "shared/hits.wgsl"
 
 struct LightParams {
     size: vec2<u32>,
@@ -42,14 +44,6 @@ struct LightParams {
 const GREY = 0u;
 const COLOURED = 1u;
 const PARTS_OF_FOUR = 2u;
-
-struct Hits {
-    pixel: array<vec2<u32>>,
-}
-
-struct Accessibility {
-    pixel: array<f32>,
-}
 
 var<immediate> params: LightParams;
 @group(0) @binding(0) var<uniform> eyes: Eyes;

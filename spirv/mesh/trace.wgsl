@@ -7,6 +7,7 @@
 #include "shared/ray.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/hash.wgsl"
+#include "shared/accessibility.wgsl"
 
 struct TraceParams {
     size: vec2<u32>,
@@ -20,11 +21,6 @@ struct TraceParams {
     delta: f32,
 }
 
-struct Accessibility {
-    // for each pixel 1 - AO; until the last piece has come the sum over the rays so far
-    pixel: array<f32>,
-}
-
 var<immediate> params: TraceParams;
 @group(0) @binding(0) var<uniform> eyes: Eyes;
 @group(0) @binding(1) var<storage, read> tree: Tree;
@@ -33,6 +29,7 @@ var<immediate> params: TraceParams;
 @group(0) @binding(4) var<storage, read> materials: Materials;
 @group(0) @binding(5) var<storage, read> texels: Texels;
 @group(0) @binding(6) var<storage, read> geometry: Geometry;
+// until the last piece has come the sum over the rays so far
 @group(0) @binding(7) var<storage, read_write> accessibility: Accessibility;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;

@@ -6,7 +6,8 @@
 // have too. Where the weights sum to less than LEAST no block is like the pixel: it is marked, and computed for itself.
 
 #include "shared/geometry.wgsl"
-#include "shared/failed.wgsl"
+#include "shared/accessibility.wgsl"
+#include "shared/sparse.wgsl"
 
 struct UpsampleParams {
     size: vec2<u32>,
@@ -15,14 +16,6 @@ struct UpsampleParams {
     // blocks along an edge of the kernel, odd
     taps: u32,
     delta: f32,
-}
-
-struct Accessibility {
-    pixel: array<f32>,
-}
-
-struct Sparse {
-    block: array<f32>,
 }
 
 struct Failures {

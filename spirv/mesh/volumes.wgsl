@@ -8,6 +8,7 @@
 #include "shared/geometry.wgsl"
 #include "shared/occluder.wgsl"
 #include "shared/bricks.wgsl"
+#include "shared/accessibility.wgsl"
 
 struct VolumesParams {
     size: vec2<u32>,
@@ -28,10 +29,6 @@ struct Items {
 struct Corners {
     // eight for each item: the base's, then those over them
     corner: array<vec4<f32>>,
-}
-
-struct Accessibility {
-    pixel: array<f32>,
 }
 
 struct Vertex {

@@ -1,13 +1,9 @@
 // What the image-space methods share: depths of places, accessibility a pixel, and patterns of samples without tables.
 // Whoever includes this binds `geometry`.
 
+#include "shared/accessibility.wgsl"
 #include "shared/geometry.wgsl"
 #include "shared/hash.wgsl"
-
-struct Accessibility {
-    // one a pixel, in the order of the geometry: 1 = open; 1 where nothing is
-    value: array<f32>,
-}
 
 const TAU = 6.28318530718;
 
