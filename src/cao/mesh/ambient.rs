@@ -102,11 +102,6 @@ impl ByVolumes {
         let row = on.geometry.size()[0] * on.geometry.views() as u32;
         (PIXELS_OF_A_PART / row.max(1)).max(1).next_multiple_of(8)
     }
-
-    /// How many pixels the last picture computed for themselves, for no block was like them: a u32.
-    pub fn failures(&self) -> &Buffer {
-        &self.upsample.failures
-    }
 }
 
 impl PixelAmbient for ByVolumes {
