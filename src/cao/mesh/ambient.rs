@@ -7,7 +7,7 @@ use crate::mesh::surfaces::{Surfaces, VolumeTree};
 use crate::mesh::trace::{Rays, Trace};
 use crate::mesh::upsample::Upsample;
 use crate::stages;
-use cao_gpu::{Access, Buffer, Gpu, Recorder};
+use cao_gpu::{Access, Buffer, DeviceKind, Gpu, Recorder};
 
 /// Gives each pixel the light that reaches it.
 pub trait PixelAmbient {
@@ -50,6 +50,14 @@ pub struct ByRays {
 /// Rays times pixels of a part: some hundredth of a second of a software driver at each of ten thousand triangles' depth of tree.
 const RAYS_OF_A_PART: u32 = 1 << 17;
 
+/// How many times as much a part has on hardware: a small GPU is so much faster, and a large one stands idle with less.
+const ON_HARDWARE: u32 = 64;
+
+/// What a part has, of what it has on a software driver.
+fn scaled(gpu: &Gpu, of_a_part: u32) -> u32 {
+    if gpu.info().kind == DeviceKind::Cpu { of_a_part } else { ON_HARDWARE * of_a_part }
+}
+
 impl ByRays {
     /// So many a pixel.
     pub fn new(gpu: &Gpu, rays: u32) -> Result<Self> {
@@ -58,7 +66,7 @@ impl ByRays {
 
     fn of_a_part(on: &Pixels) -> u32 {
         let [width, height] = on.geometry.size();
-        (RAYS_OF_A_PART / (width * height * on.geometry.views() as u32).max(1)).max(1)
+        (scaled(on.gpu, RAYS_OF_A_PART) / (width * height * on.geometry.views() as u32).max(1)).max(1)
     }
 }
 
@@ -100,7 +108,7 @@ impl ByVolumes {
     /// Some thousands of pixels, whole workgroups.
     fn rows_of_a_part(on: &Pixels) -> u32 {
         let row = on.geometry.size()[0] * on.geometry.views() as u32;
-        (PIXELS_OF_A_PART / row.max(1)).max(1).next_multiple_of(8)
+        (scaled(on.gpu, PIXELS_OF_A_PART) / row.max(1)).max(1).next_multiple_of(8)
     }
 }
 
