@@ -1,9 +1,10 @@
-// Ambient occlusion volumes (AOV section 5) gathered instead of drawn: each pixel walks the tree of the volumes' boxes and sums what the
+// Ambient occlusion volumes (AOV section 5) gathered instead of drawn: the tree of the volumes' boxes is walked, and each pixel sums what the
 // triangles contribute in whose volume it lies. The same sum as drawing all volumes over each other with additive blending; in
-// compute, where a data-centre GPU has thirty times the units that it has for fragments, and in the same order each time.
+// compute, where a data-centre GPU has thirty times the units that it has for fragments, and of integers, so that no order matters.
 //
 // `full` is for every pixel; `sparse` for one pixel of a block of step x step, the middle one (section 3.2); `failed` for those that
-// `upsample` marked.
+// `upsample` listed. A workgroup walks together: for the pixels of a tile, which then go over the same triangles, each for itself; or for one
+// pixel alone, whose triangles are divided among all.
 
 #include "shared/geometry.wgsl"
 #include "shared/occluder.wgsl"
@@ -19,6 +20,8 @@ struct GatherParams {
     // `full`: the first row of this part
     first_row: u32,
     rows: u32,
+    // `failed`: workgroups
+    groups: u32,
     // mm: how far occlusion reaches
     delta: f32,
 }
@@ -32,76 +35,186 @@ var<immediate> params: GatherParams;
 @group(0) @binding(4) var<storage, read_write> accessibility: Accessibility;
 @group(0) @binding(5) var<storage, read_write> sparse_sums: Sparse;
 @group(0) @binding(6) var<storage, read> shares: Shares;
+@group(0) @binding(7) var<storage, read_write> failures: Failures;
 
-fn occlusion_at(view: u32, pixel: vec2<u32>) -> f32 {
+// Units of an occlusion of 1: exact in an f32, and of all invocations together within a u32.
+const WHOLE = 16777216u;
+
+// What a pixel shows.
+struct Place {
+    point: vec3<f32>,
+    normal: vec3<f32>,
+    // see contribution
+    nothing: f32,
+    // false: nothing
+    shown: bool,
+}
+
+fn place_at(view: u32, pixel: vec2<u32>) -> Place {
     let here = geometry.pixel[pixel_index(params.size, view, pixel)];
-    if here.w == 0.0 {
-        return 0.0;
-    }
     let point = position_of(eyes.eye[view], params.size, pixel, here.w);
-    let nothing = uncertainty(point, here.w);
-    let nodes = tree.node[0].skip;
-    var sum = 0.0;
-    var i = 0u;
-    while i < nodes {
-        let node = tree.node[i];
-        if any(point < node.low) || any(point > node.high) {
-            i = node.skip;
-            continue;
-        }
-        let first = leaf_first(node);
-        for (var k = 0u; k < leaf_count(node); k++) {
-            let triangle = triangles.triangle[first + k];
-            sum += contribution(triangle, shares.triangle[first + k], point, here.xyz, params.delta, nothing);
-        }
-        i++;
+    return Place(point, here.xyz, uncertainty(point, here.w), here.w != 0.0);
+}
+
+// What the triangles of a leaf contribute there, in units.
+fn of_leaf(leaf: TreeNode, place: Place) -> u32 {
+    let first = leaf_first(leaf);
+    var sum = 0u;
+    for (var k = first; k < first + leaf_count(leaf); k++) {
+        let share = shares.triangle[k];
+        let part = contribution(triangles.triangle[k], share, place.point, place.normal, params.delta, place.nothing);
+        sum += u32(min(part, 1.0) * f32(WHOLE) + 0.5);
     }
     return sum;
 }
 
-@compute @workgroup_size(8, 8)
-fn full(@builtin(global_invocation_id) id: vec3<u32>) {
-    let pixel = vec2(id.x, params.first_row + id.y);
-    if id.y < params.rows && all(pixel < params.size) {
-        accessibility.pixel[pixel_index(params.size, id.z, pixel)] = 1.0 - min(occlusion_at(id.z, pixel), 1.0);
-    }
-}
+// Invocations of a group that walks together.
+const LANES = 32u;
+// Nodes that wait to be looked at, and leaves that wait for their triangles to be.
+const NODES = 1024u;
+const LEAVES = 64u;
+// How deep a tree may be, as cao_model::bvh has it.
+const DEEPEST = 64u;
 
-@compute @workgroup_size(8, 8)
-fn sparse(@builtin(global_invocation_id) id: vec3<u32>) {
-    if all(id.xy < params.blocks) {
-        let pixel = min(id.xy * params.step + params.step / 2u, params.size - 1u);
-        sparse_sums.block[pixel_index(params.blocks, id.z, id.xy)] = occlusion_at(id.z, pixel);
-    }
-}
+var<workgroup> nodes: array<u32, NODES>;
+var<workgroup> leaves: array<u32, LEAVES>;
+// Which invocations have found an inner node and which a leaf, a bit each; this turn's and the next one's.
+var<workgroup> inner: array<atomic<u32>, 2>;
+var<workgroup> outer: array<atomic<u32>, 2>;
 
-// The failed pixels of a tile, brought together, so that no invocation waits for those that have nothing to do.
-// Pixels along its edge.
-const TILE = 16u;
-var<workgroup> found: array<u32, TILE * TILE>;
-var<workgroup> count: atomic<u32>;
-
-@compute @workgroup_size(64)
-fn failed(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    if local == 0u {
-        atomicStore(&count, 0u);
+// Walks the tree with all invocations of a group, of which each sums: in units, the triangles that contribute to its own place, or its part
+// of those that contribute to the one place that all have. `low` and `high`: a box about all places.
+fn walk(low: vec3<f32>, high: vec3<f32>, place: Place, for_one: bool, lane: u32) -> u32 {
+    if lane == 0u {
+        nodes[0] = 0u;
+        atomicStore(&inner[0], 0u);
+        atomicStore(&outer[0], 0u);
     }
     workgroupBarrier();
-    for (var k = local; k < TILE * TILE; k += 64u) {
-        let pixel = group.xy * TILE + vec2(k % TILE, k / TILE);
-        if all(pixel < params.size) {
-            let index = pixel_index(params.size, group.z, pixel);
-            if accessibility.pixel[index] == FAILED {
-                found[atomicAdd(&count, 1u)] = k;
+    var sum = 0u;
+    var waiting = 1u;
+    var ready = 0u;
+    var turn = 0u;
+    while waiting > 0u {
+        // Where memory runs low one after the other, which asks for no more than the tree is deep.
+        let taken = min(waiting, select(1u, LANES, waiting + LANES + DEEPEST <= NODES));
+        waiting -= taken;
+        var index = 0u;
+        if lane < taken {
+            index = nodes[waiting + lane];
+            let node = tree.node[index];
+            if all(node.low <= high) && all(node.high >= low) {
+                if leaf_count(node) == 0u {
+                    atomicOr(&inner[turn], 1u << lane);
+                } else {
+                    atomicOr(&outer[turn], 1u << lane);
+                }
+            }
+        }
+        workgroupBarrier();
+        let entered = atomicLoad(&inner[turn]);
+        let found = atomicLoad(&outer[turn]);
+        let before = (1u << lane) - 1u;
+        if ((entered >> lane) & 1u) != 0u {
+            let at = waiting + 2u * countOneBits(entered & before);
+            nodes[at] = tree.node[index + 1u].skip;
+            nodes[at + 1u] = index + 1u;
+        }
+        if ((found >> lane) & 1u) != 0u {
+            leaves[ready + countOneBits(found & before)] = index;
+        }
+        waiting += 2u * countOneBits(entered);
+        ready += countOneBits(found);
+        turn = 1u - turn;
+        if lane == 0u {
+            atomicStore(&inner[turn], 0u);
+            atomicStore(&outer[turn], 0u);
+        }
+        workgroupBarrier();
+        while ready > 0u && (waiting == 0u || ready > LEAVES - LANES) {
+            if for_one {
+                let some = min(ready, LANES);
+                ready -= some;
+                if lane < some {
+                    sum = min(sum + of_leaf(tree.node[leaves[ready + lane]], place), WHOLE);
+                }
+            } else {
+                ready--;
+                let leaf = tree.node[leaves[ready]];
+                if place.shown && all(place.point >= leaf.low) && all(place.point <= leaf.high) {
+                    sum = min(sum + of_leaf(leaf, place), WHOLE);
+                }
             }
         }
     }
+    return sum;
+}
+
+var<workgroup> total: atomic<u32>;
+
+// Occlusion of one pixel, the same for all invocations, by all of them together.
+fn occlusion_of(view: u32, pixel: vec2<u32>, lane: u32) -> f32 {
+    if lane == 0u {
+        atomicStore(&total, 0u);
+    }
+    let place = place_at(view, pixel);
+    // Of nothing a box that nothing meets.
+    let far = select(3e38, 0.0, place.shown);
+    let sum = walk(place.point + far, place.point + far, place, true, lane);
+    atomicAdd(&total, sum);
     workgroupBarrier();
-    let there = atomicLoad(&count);
-    for (var i = local; i < there; i += 64u) {
-        let k = found[i];
-        let pixel = group.xy * TILE + vec2(k % TILE, k / TILE);
-        let index = pixel_index(params.size, group.z, pixel);
-        accessibility.pixel[index] = 1.0 - min(occlusion_at(group.z, pixel), 1.0);
+    let all = atomicLoad(&total);
+    workgroupBarrier();
+    return f32(min(all, WHOLE)) / f32(WHOLE);
+}
+
+var<workgroup> shown: array<vec4<f32>, LANES>;
+
+// A workgroup a tile.
+@compute @workgroup_size(8, 4)
+fn full(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pixel = vec2(id.x, params.first_row + id.y);
+    let there = id.y < params.rows && all(pixel < params.size);
+    var place = place_at(id.z, min(pixel, params.size - 1u));
+    place.shown = place.shown && there;
+    shown[lane] = vec4(place.point, select(0.0, 1.0, place.shown));
+    workgroupBarrier();
+    var low = vec3(3e38);
+    var high = vec3(-3e38);
+    for (var k = 0u; k < LANES; k++) {
+        if shown[k].w != 0.0 {
+            low = min(low, shown[k].xyz);
+            high = max(high, shown[k].xyz);
+        }
+    }
+    let sum = walk(low, high, place, false, lane);
+    if there {
+        accessibility.pixel[pixel_index(params.size, id.z, pixel)] = 1.0 - f32(sum) / f32(WHOLE);
+    }
+}
+
+// A workgroup a block.
+@compute @workgroup_size(LANES)
+fn sparse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pixel = min(group.xy * params.step + params.step / 2u, params.size - 1u);
+    let occlusion = occlusion_of(group.z, pixel, lane);
+    if lane == 0u {
+        sparse_sums.block[pixel_index(params.blocks, group.z, group.xy)] = occlusion;
+    }
+}
+
+// A workgroup every `groups`-th pixel that `upsample` has listed.
+@compute @workgroup_size(LANES)
+fn failed(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let pixels = params.size.x * params.size.y;
+    let listed = atomicLoad(&failures.count);
+    for (var i = group.x; i < listed; i += params.groups) {
+        let index = failures.pixel[i];
+        let in_view = index % pixels;
+        let pixel = vec2(in_view % params.size.x, in_view / params.size.x);
+        let occlusion = occlusion_of(index / pixels, pixel, lane);
+        if lane == 0u {
+            accessibility.pixel[index] = 1.0 - occlusion;
+        }
     }
 }

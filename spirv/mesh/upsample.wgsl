@@ -3,7 +3,7 @@
 //   w_i = exp(-d_i^2 / 2 sigma^2) exp(-(n.(p_i - p))^2 / 2 (delta/10)^2) max(0, n.n_i)^8    sigma = taps/4 blocks
 //
 // d_i in blocks, p_i and n_i those of the block's own pixel. The distance is that from the tangent plane and not of depths, which slopes
-// have too. Where the weights sum to less than LEAST no block is like the pixel: it is marked, and computed for itself.
+// have too. Where the weights sum to less than LEAST no block is like the pixel: it is listed, and computed for itself.
 
 #include "shared/geometry.wgsl"
 #include "shared/accessibility.wgsl"
@@ -18,11 +18,6 @@ struct UpsampleParams {
     delta: f32,
 }
 
-struct Failures {
-    // pixels that were marked
-    count: atomic<u32>,
-}
-
 var<immediate> params: UpsampleParams;
 @group(0) @binding(0) var<uniform> eyes: Eyes;
 @group(0) @binding(1) var<storage, read> geometry: Geometry;
@@ -31,6 +26,8 @@ var<immediate> params: UpsampleParams;
 @group(0) @binding(4) var<storage, read_write> failures: Failures;
 
 const LEAST = 1e-3;
+// Written for a pixel that no block is like: below any accessibility.
+const FAILED = -1.0;
 // Of delta: how far from the tangent plane a block may be.
 const PLANE = 0.1;
 
@@ -70,13 +67,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let alike2 = alike * alike;
             let alike4 = alike2 * alike2;
             let weight = exp(-0.5 * (dot(away, away) / (sigma * sigma) + off * off / (plane * plane))) * alike4 * alike4;
-            sum += weight * min(sparse_sums.block[pixel_index(params.blocks, id.z, vec2<u32>(block))], 1.0);
+            sum += weight * sparse_sums.block[pixel_index(params.blocks, id.z, vec2<u32>(block))];
             weights += weight;
         }
     }
     if weights < LEAST {
         accessibility.pixel[index] = FAILED;
-        atomicAdd(&failures.count, 1u);
+        failures.pixel[atomicAdd(&failures.count, 1u)] = index;
         return;
     }
     accessibility.pixel[index] = 1.0 - sum / weights;

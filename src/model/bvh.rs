@@ -33,6 +33,9 @@ pub struct Bvh {
 /// Most items of a leaf.
 pub const LEAF: usize = 4;
 
+/// No node lies deeper: from half of it on items are halved and not cut.
+pub const DEEPEST: usize = 64;
+
 /// Places that are tried for a cut, along each axis.
 const BINS: usize = 16;
 
@@ -85,7 +88,9 @@ impl Bvh {
             }
             bvh.nodes.push(Node { first: 0, count: 0, ..leaf });
             open.push(here);
-            let middle = begin + cut(items, boxes, &centres);
+            // As many are open as it lies deep.
+            let first = if open.len() > DEEPEST / 2 { items.len() / 2 } else { cut(items, boxes, &centres) };
+            let middle = begin + first;
             todo.extend([None, Some((middle, end)), Some((begin, middle))]);
         }
         bvh
@@ -199,6 +204,27 @@ mod tests {
         (items, visited)
     }
 
+    /// Of the deepest node; the root's is 0.
+    fn depth(nodes: &[Node]) -> usize {
+        let (mut inside, mut deepest): (Vec<u32>, _) = (Vec::new(), 0);
+        for (i, node) in nodes.iter().enumerate() {
+            inside.retain(|end| *end > i as u32);
+            deepest = deepest.max(inside.len());
+            inside.push(node.skip);
+        }
+        deepest
+    }
+
+    #[test]
+    fn no_tree_is_deep() {
+        // Each twice as far away as the one before: a cut takes off the last few alone.
+        let far: Vec<Bounds> =
+            (0..4000).map(|i| Vec3::splat(1e-30 * 1.05f32.powi(i % 1400))).map(|low| (low, low)).collect();
+        let bvh = Bvh::new(&far);
+        let found = depth(&bvh.nodes);
+        assert!(found > DEEPEST / 2 && found <= DEEPEST, "{found}");
+    }
+
     #[test]
     fn every_box_is_found_and_few_nodes_are_looked_at() {
         for count in [0, 1, 4, 5, 3000] {
@@ -210,6 +236,7 @@ mod tests {
             order.sort_unstable();
             assert_eq!(order, (0..count).collect::<Vec<_>>());
             assert!(bvh.nodes.iter().all(|node| node.count as usize <= LEAF));
+            assert!(depth(&bvh.nodes) <= DEEPEST);
             for i in 0..20 {
                 let point = Vec3::new(0.05 * i as f32, 0.3 + 0.02 * i as f32, 0.9 - 0.04 * i as f32);
                 for (nodes, boxes) in [(&bvh.nodes, &boxes), (&refitted, &grown)] {

@@ -29,7 +29,7 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
     run(&gpu, |rec| gather.record_full(rec, scene, 0..SIZE[1], &every).unwrap());
     let full = floats(&gpu, &every);
     let shown = views.map(|view| gbuffer(&world, &[], &view, SIZE));
-    let mut failures = Vec::new();
+    let mut counts = Vec::new();
     for step in [3, 5, 15] {
         let blocks = Blocks::new(&gpu, &pixels.geometry, step).unwrap();
         let accessibility = pixels.values(&gpu);
@@ -39,9 +39,13 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
             upsample.record(rec, scene, &blocks, &accessibility).unwrap();
         });
         let (sums, marked) = (floats(&gpu, &blocks.sums), floats(&gpu, &accessibility));
-        let failed = u32::from_le_bytes(read_buffer(&gpu, &upsample.failures).try_into().unwrap());
-        assert_eq!(failed as usize, marked.iter().filter(|value| **value < 0.0).count());
-        run(&gpu, |rec| gather.record_failed(rec, scene, &accessibility).unwrap());
+        let failures: Vec<u32> = bytemuck::pod_collect_to_vec(&read_buffer(&gpu, &blocks.failures));
+        let failed = failures[0];
+        let mut listed = failures[1..=failed as usize].to_vec();
+        listed.sort_unstable();
+        let negative = |i: &u32| marked[*i as usize] < 0.0;
+        assert_eq!(listed, (0..marked.len() as u32).filter(negative).collect::<Vec<_>>());
+        run(&gpu, |rec| gather.record_failed(rec, scene, &blocks, &accessibility).unwrap());
         let mended = floats(&gpu, &accessibility);
         let (mut other, per_view) = (0, (SIZE[0] * SIZE[1]) as usize);
         for (i, &found) in marked.iter().enumerate() {
@@ -60,10 +64,10 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
             assert_eq!(mended[i], if found < 0.0 { full[i] } else { found });
         }
         assert!(f64::from(other) < OTHER * marked.len() as f64, "step {step}: {other}");
-        failures.push(failed);
+        counts.push(failed);
     }
     // The coarser, the more pixels that nothing is like; here they are the box's and the needle's.
-    assert!(failures[0] <= failures[1] && failures[1] < failures[2], "{failures:?}");
-    drop((pixels, volumes, upsample, every));
+    assert!(counts[0] <= counts[1] && counts[1] < counts[2], "{counts:?}");
+    drop((pixels, volumes, every));
     close(gpu);
 }

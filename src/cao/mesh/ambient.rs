@@ -143,7 +143,7 @@ impl PixelAmbient for ByVolumes {
         rec.end_stage()?;
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         rec.stage(stages::FAILED)?;
-        self.gather.record_failed(rec, scene, accessibility)?;
+        self.gather.record_failed(rec, scene, blocks, accessibility)?;
         Ok(rec.end_stage()?)
     }
 }

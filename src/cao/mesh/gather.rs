@@ -9,6 +9,13 @@ use cao_gpu::{Access, Buffer, BufferUse, Gpu, Pipeline, Recorder};
 use cao_kernels::gather as kernel;
 use std::ops::Range;
 
+const _: () = assert!(kernel::DEEPEST as usize == cao_model::bvh::DEEPEST, "nodes that wait would not fit");
+
+/// Workgroups for failed pixels: as many as the largest GPUs hold at once.
+const MOST_GROUPS: u32 = 4096;
+/// Pixels of a picture for each: where few fail, fewer are enough.
+const PIXELS_A_GROUP: u32 = 64;
+
 /// The kernel `gather`.
 pub struct Gather {
     full: Pipeline,
@@ -29,10 +36,12 @@ pub struct Scene<'a> {
     pub delta_mm: f32,
 }
 
-/// Sums of one pixel of each block.
+/// Sums of one pixel of each block, cut off at 1.
 pub struct Blocks {
     /// Bound as `sparse_sums`.
     pub sums: Buffer,
+    /// Bound as `failures`: how many pixels no block is like, and which, u32 each.
+    pub failures: Buffer,
     /// Blocks across and down a view.
     pub count: [u32; 2],
     /// Pixels along the edge of one.
@@ -44,7 +53,13 @@ impl Blocks {
     pub fn new(gpu: &Gpu, geometry: &Geometry, step: u32) -> Result<Self> {
         let count = geometry.size().map(|pixels| pixels.div_ceil(step));
         let bytes = 4 * u64::from(count[0]) * u64::from(count[1]) * geometry.views() as u64;
-        Ok(Self { sums: gpu.buffer("sparse occlusion", bytes, BufferUse::Device)?, count, step })
+        let pixels = geometry.pixels.bytes() / Geometry::BYTES;
+        Ok(Self {
+            sums: gpu.buffer("sparse occlusion", bytes, BufferUse::Device)?,
+            failures: gpu.buffer("failed pixels", 4 + 4 * pixels, BufferUse::Device)?,
+            count,
+            step,
+        })
     }
 }
 
@@ -62,6 +77,8 @@ impl Gather {
             step,
             first_row: 0,
             rows: 0,
+            groups: 0,
+            pad: Default::default(),
             delta: scene.delta_mm,
         }
     }
@@ -104,12 +121,18 @@ impl Gather {
             sparse_sums: &blocks.sums,
         };
         let params = Self::params(scene, blocks.count, blocks.step);
-        let over = [blocks.count[0], blocks.count[1], geometry.views() as u32];
-        Ok(rec.dispatch_over(&self.sparse, &binds, bytemuck::bytes_of(&params), over)?)
+        let groups = [blocks.count[0], blocks.count[1], geometry.views() as u32];
+        Ok(rec.dispatch(&self.sparse, &binds, bytemuck::bytes_of(&params), groups)?)
     }
 
-    /// The pixels that [`Upsample`](crate::mesh::upsample::Upsample) has marked.
-    pub fn record_failed(&self, rec: &mut Recorder, scene: Scene, accessibility: &Buffer) -> Result<()> {
+    /// The pixels that [`Upsample`](crate::mesh::upsample::Upsample) has listed.
+    pub fn record_failed(
+        &self,
+        rec: &mut Recorder,
+        scene: Scene,
+        blocks: &Blocks,
+        accessibility: &Buffer,
+    ) -> Result<()> {
         let Scene { geometry, surfaces, volumes, .. } = scene;
         let binds = kernel::FailedBindings {
             eyes: &geometry.eyes,
@@ -118,16 +141,13 @@ impl Gather {
             shares: &surfaces.shares,
             geometry: &geometry.pixels,
             accessibility,
+            failures: &blocks.failures,
         };
-        let params = Self::params(scene, [0; 2], 1);
-        let [columns, rows] = geometry.size().map(|pixels| pixels.div_ceil(kernel::TILE));
+        let pixels = (geometry.pixels.bytes() / Geometry::BYTES) as u32;
+        let groups = pixels.div_ceil(PIXELS_A_GROUP).min(MOST_GROUPS);
+        let params = kernel::GatherParams { groups, ..Self::params(scene, [0; 2], 1) };
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
-        rec.dispatch(
-            &self.failed,
-            &binds,
-            bytemuck::bytes_of(&params),
-            [columns, rows, geometry.views() as u32],
-        )?;
+        rec.dispatch(&self.failed, &binds, bytemuck::bytes_of(&params), [groups, 1, 1])?;
         Ok(())
     }
 }

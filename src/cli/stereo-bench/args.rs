@@ -3,7 +3,7 @@
 use super::scale::Series;
 use super::way::Way;
 use cao_cli::args::{Global, Raw, Settings, methods_help, size};
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use std::ffi::OsString;
 use std::path::PathBuf;
 
@@ -63,9 +63,11 @@ pub struct Cli {
     /// [default of FOLDER: benches/runs]
     #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "benches/runs")]
     pub save: Option<PathBuf>,
-    /// Measure what the project holds itself to and exit with 1 where a bar is missed; every other setting is the bar's own
-    #[arg(long)]
-    pub bars: bool,
+    /// Measure what the project holds itself to and exit with 1 where a bar is missed; every other setting is the bar's own. Of some parts
+    /// alone: volumes, networks, meshes
+    #[arg(long, value_enum, value_name = "PART,...", value_delimiter = ',', num_args = 0.., require_equals = true,
+        default_missing_values = ["volumes", "networks", "meshes"])]
+    pub bars: Vec<Part>,
     /// Folder with volumes/engine_256x256x128_uint8.nrrd and volumes/torso_s0024_287x287x486_uint8.nrrd, for the bars on real
     /// volumes
     #[arg(long, value_name = "DIR", requires = "bars")]
@@ -81,6 +83,17 @@ pub struct Cli {
     pub global: Global,
 }
 
+/// Parts of the bars.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Part {
+    /// Updates and pictures of volumes.
+    Volumes,
+    /// Method `dvao`.
+    Networks,
+    /// Occlusion of pixels that show meshes.
+    Meshes,
+}
+
 const EXAMPLES: &str = "\
 Examples:
   stereo-bench                                 the built-in engine block, all methods
@@ -91,6 +104,7 @@ Examples:
   stereo-bench --scale size,rays,radius,resolution,views --save
   stereo-bench --methods rays --budget-ms 4 --frames 90     a clip that moves, updates of at most 4 ms a frame
   stereo-bench --bars --data DIR               minutes on a software driver
+  stereo-bench --bars=meshes                   only those
 
 The path: in 90 frames the head goes once round an ellipse of 20 degrees of
 azimuth and 8 of elevation about a place from which the volume fills the

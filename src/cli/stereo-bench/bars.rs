@@ -4,7 +4,7 @@
 //! volumes it is timed on a random sample of bricks and scaled by their share of all; the default method is always timed whole, with
 //! everything that an update does. Rows in milliseconds are judged on a GPU; a software driver measures them small, without a bar.
 
-use super::args::Cli;
+use super::args::{Cli, Part};
 use super::machine;
 use super::statistics::median;
 use anyhow::{Context, Result};
@@ -476,7 +476,24 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     out.line(format!("machine   {machine}"));
     out.line(format!("medians of {RUNS} runs in one process, warmed up, lowest and highest in brackets"));
     let mut rows = Rows { rows: Vec::new(), out, progress };
+    if cli.bars.contains(&Part::Volumes) {
+        volumes(cli, &gpu, [engine, torso], &mut rows)?;
+    }
+    rows.progress.set(0.8);
+    if cli.bars.contains(&Part::Networks) {
+        super::networks::bars(cli, software, &mut rows)?;
+    }
+    if cli.bars.contains(&Part::Meshes) {
+        super::meshes::bars(&gpu, software, &mut rows)?;
+    }
+    check_validation(&gpu)?;
+    end(cli, rows, &machine, software)
+}
+
+/// Those of volumes, of the real ones where they are given.
+fn volumes(cli: &Cli, gpu: &Gpu, real: [Option<Scene>; 2], rows: &mut Rows) -> Result<()> {
     // The most telling first: the same rows small on a software driver.
+    let software = gpu.info().kind == DeviceKind::Cpu;
     let (size, radius, pixels) = if software { (64, 12.0, [256, 276]) } else { (512, 50.0, [2064, 2208]) };
     let scenes = [
         ("engine", [(Quadrature::Hybrid, 30.0, 10.0), (Quadrature::Nearest, 20.0, 6.0)]),
@@ -485,40 +502,35 @@ pub fn run(cli: &Cli) -> Result<ExitCode> {
     for (name, rules) in scenes {
         let scene = Scene::built_in(name, size, 60.0)?;
         for rule in rules {
-            absolute(&gpu, &scene, radius, rule, &mut rows)?;
+            absolute(gpu, &scene, radius, rule, rows)?;
         }
         rows.progress.set(0.1 * rows.rows.len() as f64 / 4.0);
         if name == "engine" {
-            rows.push(against_lao(&gpu, &scene, radius, Bar::None)?)?;
+            rows.push(against_lao(gpu, &scene, radius, Bar::None)?)?;
             rows.push(memory(cli, &scene, radius)?)?;
-            rows.push(picture(&gpu, &scene, pixels)?)?;
+            rows.push(picture(gpu, &scene, pixels)?)?;
         }
     }
     rows.progress.set(0.5);
-    if let (Some(engine), Some(torso)) = (&engine, &torso) {
-        rows.push(error(&gpu, engine, 20.0, RaySet::Spiral(50), Bar::AtMost(0.0055))?)?;
-        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(50), Bar::AtMost(0.014))?)?;
-        rows.push(error(&gpu, torso, 50.0, RaySet::Spiral(192), Bar::AtMost(0.0062))?)?;
+    if let [Some(engine), Some(torso)] = &real {
+        rows.push(error(gpu, engine, 20.0, RaySet::Spiral(50), Bar::AtMost(0.0055))?)?;
+        rows.push(error(gpu, torso, 50.0, RaySet::Spiral(50), Bar::AtMost(0.014))?)?;
+        rows.push(error(gpu, torso, 50.0, RaySet::Spiral(192), Bar::AtMost(0.0062))?)?;
         // These bars are a software driver's; a GPU has milliseconds.
         let at_least = |ratio: f64| if software { Bar::AtLeast(ratio) } else { Bar::None };
-        rows.push(against_lao(&gpu, engine, 20.0, at_least(12.0))?)?;
-        rows.push(against_lao(&gpu, torso, 50.0, at_least(40.0))?)?;
+        rows.push(against_lao(gpu, engine, 20.0, at_least(12.0))?)?;
+        rows.push(against_lao(gpu, torso, 50.0, at_least(40.0))?)?;
         let from = Vec3::new(20.0, -30.0, 10.0);
-        rows.push(clip_ratio(&gpu, engine, [from, from + Vec3::X], "moved 1 voxel", at_least(2.5))?)?;
+        rows.push(clip_ratio(gpu, engine, [from, from + Vec3::X], "moved 1 voxel", at_least(2.5))?)?;
         let to = Vec3::new(-35.0, 25.0, 0.0);
-        rows.push(clip_ratio(&gpu, engine, [from, to], "at a new place", at_least(1.5))?)?;
+        rows.push(clip_ratio(gpu, engine, [from, to], "at a new place", at_least(1.5))?)?;
     }
-    rows.progress.set(0.8);
-    super::networks::bars(cli, software, &mut rows)?;
-    super::meshes::bars(&gpu, software, &mut rows)?;
-    rows.progress.set(0.9);
     if !software && cli.large {
         let scene = Scene::built_in("engine", 1024, 60.0)?;
-        absolute(&gpu, &scene, radius, (Quadrature::Hybrid, f64::INFINITY, f64::INFINITY), &mut rows)?;
+        absolute(gpu, &scene, radius, (Quadrature::Hybrid, f64::INFINITY, f64::INFINITY), rows)?;
         rows.push(memory(cli, &scene, radius)?)?;
     }
-    check_validation(&gpu)?;
-    end(cli, rows, &machine, software)
+    Ok(())
 }
 
 fn end(cli: &Cli, rows: Rows, machine: &str, software: bool) -> Result<ExitCode> {

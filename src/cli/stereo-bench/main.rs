@@ -29,5 +29,5 @@ fn main() -> ExitCode {
         Ok((cli, _)) => cli,
         Err(code) => return code,
     };
-    cao_cli::end("stereo-bench", if cli.bars { bars::run(&cli) } else { suite::run(&cli) })
+    cao_cli::end("stereo-bench", if cli.bars.is_empty() { suite::run(&cli) } else { bars::run(&cli) })
 }
