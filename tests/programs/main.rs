@@ -9,6 +9,7 @@ mod cli_refusals;
 mod dicom;
 mod features;
 mod gallery;
+mod image_space;
 mod meshes;
 mod orders;
 mod peers;
