@@ -21,6 +21,8 @@ struct GatherParams {
     rows: u32,
     // mm: how far occlusion reaches
     delta: f32,
+    // whether volumes end where their corners are clamped
+    clamped: u32,
 }
 
 var<immediate> params: GatherParams;
@@ -52,7 +54,8 @@ fn occlusion_at(view: u32, pixel: vec2<u32>) -> f32 {
         let first = leaf_first(node);
         for (var k = 0u; k < leaf_count(node); k++) {
             let triangle = triangles.triangle[first + k];
-            sum += contribution(triangle, shares.triangle[first + k], point, here.xyz, params.delta, nothing);
+            let share = shares.triangle[first + k];
+            sum += contribution(triangle, share, point, here.xyz, params.delta, nothing, params.clamped != 0u);
         }
         i++;
     }

@@ -63,6 +63,8 @@ impl Gather {
             first_row: 0,
             rows: 0,
             delta: scene.delta_mm,
+            clamped: u32::from(scene.volumes.clamped),
+            pad: Default::default(),
         }
     }
 
