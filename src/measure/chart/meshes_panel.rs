@@ -150,8 +150,7 @@ fn legend(drawing: &mut Drawing, [x, y]: [f64; 2]) {
         drawing.marker(marker, [x + 8.0, y], RADIUS, colour, false);
         drawing.text([x + 22.0, y + 4.0], name, 12, Anchor::Start, INK, false);
     }
-    let lines =
-        [("Pareto front", FRONT, 2.0, false), ("Crytek, whose samples do not change", LINES[5].1, 1.0, true)];
+    let lines = [("Pareto front", FRONT, 2.0, false), ("error of Crytek", LINES[5].1, 1.0, true)];
     for (n, (text, colour, width, dashed)) in lines.into_iter().enumerate() {
         let y = y + 20.0 * (LINES.len() + n) as f64;
         drawing.line([x, y], [x + 16.0, y], colour, width, dashed);
