@@ -24,6 +24,8 @@ struct GatherParams {
     groups: u32,
     // mm: how far occlusion reaches
     delta: f32,
+    // whether volumes end where their corners are clamped
+    clamped: u32,
 }
 
 var<immediate> params: GatherParams;
@@ -61,8 +63,10 @@ fn of_leaf(leaf: TreeNode, place: Place) -> u32 {
     let first = leaf_first(leaf);
     var sum = 0u;
     for (var k = first; k < first + leaf_count(leaf); k++) {
+        let triangle = triangles.triangle[k];
         let share = shares.triangle[k];
-        let part = contribution(triangles.triangle[k], share, place.point, place.normal, params.delta, place.nothing);
+        let clamped = params.clamped != 0u;
+        let part = contribution(triangle, share, place.point, place.normal, params.delta, place.nothing, clamped);
         sum += u32(min(part, 1.0) * f32(WHOLE) + 0.5);
     }
     return sum;

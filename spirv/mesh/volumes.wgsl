@@ -19,6 +19,8 @@ struct VolumesParams {
     first: u32,
     count: u32,
     delta: f32,
+    // whether volumes end where their corners are clamped
+    clamped: u32,
 }
 
 struct Items {
@@ -65,8 +67,8 @@ fn place_in(vertex: u32, corners: u32) -> vec2<u32> {
     return vec2(select(side, (side + 1u) % corners, next), u32(over));
 }
 
-// A corner of a triangle's volume: of its prism the triangle's corner, moved out until it is delta from both edges (eq. 23 to 29); of a
-// sliver one of the box about its longest edge, delta around it.
+// A corner of a triangle's volume: of its prism the triangle's corner, moved out until it is delta from both edges (eq. 23 to 29), or as far
+// as it is clamped; of a sliver one of the box about its longest edge, delta around it.
 fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32> {
     let a = triangle.a.xyz;
     let b = triangle.b.xyz;
@@ -75,7 +77,7 @@ fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32>
     let kind = u32(triangle.c.w);
     let under = select(0.0, -delta, (kind & TWO_SIDED) != 0u);
     let height = select(under, delta, place.y == 1u);
-    if (kind & SLIVER) != 0u {
+    if params.clamped == 0u && (kind & SLIVER) != 0u {
         let along = longest_edge(a, b, c);
         let across = cross(face, along);
         let u = vec2(dot(b - a, along), dot(c - a, along));
@@ -98,8 +100,13 @@ fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32>
         next = a;
         before = b;
     }
-    let inward = cross(face, normalize(next - corner));
-    let inward_before = cross(face, normalize(corner - before));
+    let along_next = normalize(next - corner);
+    let along_before = normalize(corner - before);
+    if params.clamped != 0u {
+        return corner + clamped_extension(along_next, along_before, face, delta) + face * height;
+    }
+    let inward = cross(face, along_next);
+    let inward_before = cross(face, along_before);
     let out = (inward + inward_before) * (delta / (1.0 + dot(inward, inward_before)));
     return corner - out + face * height;
 }
@@ -135,7 +142,8 @@ fn occlude(in: Vertex) -> @location(0) f32 {
     let point = position_of(eyes.eye[params.view], params.size, pixel, here.w);
     let triangle = triangles.triangle[in.triangle];
     let share = shares.triangle[in.triangle];
-    return contribution(triangle, share, point, here.xyz, params.delta, uncertainty(point, here.w));
+    let nothing = uncertainty(point, here.w);
+    return contribution(triangle, share, point, here.xyz, params.delta, nothing, params.clamped != 0u);
 }
 
 // The corners of the volumes of a static world.

@@ -7,6 +7,9 @@
 //
 // The paper's eq. 19 takes the angle by acos, which in f32 loses small ones; its eq. 20 and 24 end the product before k, the distance from the
 // face. Corners are relative to the point.
+//
+// The volume, where g is above 0, ends with the box of a sliver; or, as printed (section 5.2), every volume where its corners are no farther than
+// CLAMP delta from the triangle's, which cuts where g is above 0: from corners of 60 degrees on.
 
 #include "shared/world.wgsl"
 
@@ -63,18 +66,25 @@ fn occlusion_by(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, normal: vec3<f32>) -> 
     return max(0.0, -sum / TURN);
 }
 
-// What a triangle at these corners contributes to a point's occlusion: falloff times exact occlusion. `nothing`: how far in front of a face,
-// in mm, what lies there is taken for the face itself.
-fn contribution(
+// A triangle as a point sees it: its corners, so that they face the point, and g.
+struct Faced {
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>,
+    falloff: f32,
+}
+
+// `nothing`: how far in front of a face, in mm, what lies there is taken for the face itself. `clamped`: volumes end as printed.
+fn faced(
     triangle: WorldTriangle,
     share: f32,
     point: vec3<f32>,
-    normal: vec3<f32>,
     delta: f32,
     nothing: f32,
-) -> f32 {
+    clamped: bool,
+) -> Faced {
     if share <= 0.0 {
-        return 0.0;
+        return Faced(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     }
     let kind = u32(triangle.c.w);
     let a = triangle.a.xyz - point;
@@ -90,7 +100,7 @@ fn contribution(
         height = -height;
     }
     if height <= nothing || height >= delta {
-        return 0.0;
+        return Faced(a, b, c, 0.0);
     }
     let along_ab = normalize(b - a);
     let along_bc = normalize(c - b);
@@ -102,11 +112,57 @@ fn contribution(
         dot(c, cross(face, along_ca)),
     );
     let near = clamp(1.0 - outside / delta, vec3(0.0), vec3(1.0));
-    let falloff = near.x * near.y * near.z * (1.0 - height / delta);
-    if falloff <= 0.0 || ((kind & SLIVER) != 0u && !in_box(a, b, c, face, delta)) {
+    let falloff = share * near.x * near.y * near.z * (1.0 - height / delta);
+    if falloff <= 0.0 {
+        return Faced(a, b, c, 0.0);
+    }
+    if clamped {
+        return Faced(a, b, c, select(0.0, falloff, in_clamped(a, b, c, face, delta)));
+    }
+    if (kind & SLIVER) != 0u && !in_box(a, b, c, face, delta) {
+        return Faced(a, b, c, 0.0);
+    }
+    return Faced(a, b, c, falloff);
+}
+
+// What a triangle at these corners contributes to a point's occlusion: falloff times exact occlusion.
+fn contribution(
+    triangle: WorldTriangle,
+    share: f32,
+    point: vec3<f32>,
+    normal: vec3<f32>,
+    delta: f32,
+    nothing: f32,
+    clamped: bool,
+) -> f32 {
+    let seen = faced(triangle, share, point, delta, nothing, clamped);
+    if seen.falloff <= 0.0 {
         return 0.0;
     }
-    return share * falloff * occlusion_by(a, b, c, normal);
+    return seen.falloff * occlusion_by(seen.a, seen.b, seen.c, normal);
+}
+
+// Of delta: the farthest that a clamped corner is from the triangle's.
+const CLAMP = 2.0;
+
+// From a corner to that of the clamped volume: away from the triangle between its edges, until it is delta from both (eq. 28), or CLAMP delta.
+fn clamped_extension(along_next: vec3<f32>, along_before: vec3<f32>, face: vec3<f32>, delta: f32) -> vec3<f32> {
+    // Of the half angle twice the sine, and beside it twice the cosine: one of them has a direction.
+    let inward = cross(face, along_next) + cross(face, along_before);
+    let sine = length(inward);
+    let away = select(CLAMP, 2.0 / sine, CLAMP * sine > 2.0);
+    return -normalize(inward + along_next - along_before) * (away * delta);
+}
+
+// Whether the point is over the base of a clamped volume.
+fn in_clamped(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, face: vec3<f32>, delta: f32) -> bool {
+    let ab = normalize(b - a);
+    let bc = normalize(c - b);
+    let ca = normalize(a - c);
+    let p = a + clamped_extension(ab, ca, face, delta);
+    let q = b + clamped_extension(bc, ab, face, delta);
+    let r = c + clamped_extension(ca, bc, face, delta);
+    return dot(p, cross(face, q - p)) <= 0.0 && dot(q, cross(face, r - q)) <= 0.0 && dot(r, cross(face, p - r)) <= 0.0;
 }
 
 // Whether the point is over the box of a triangle in its plane, along its longest edge, grown by delta.

@@ -95,10 +95,14 @@ impl Out {
         if occlusion.sparse > 1 {
             how += &format!(", 1 of {} pixels", occlusion.sparse.pow(2));
         }
+        if occlusion.clamp {
+            how += ", corners clamped";
+        }
         self.line(format!("surfaces  {method}{how}, delta {delta_mm} mm"));
         self.json(json!({
             "triangles": triangles, "degenerate_triangles": world.degenerate, "materials": materials,
             "mesh_method": method, "delta_mm": delta_mm, "sparse": occlusion.sparse,
+            "clamp": occlusion.clamp,
         }));
     }
 

@@ -18,6 +18,7 @@
 //!     method = "aov"                   # aov rays crytek volumetric hbao
 //!     delta_mm = 60                    # how far obscurance reaches; default: a tenth of the half diagonal of all meshes
 //!     sparse = 5                       # of aov: every fifth pixel in each direction is computed; 1 3 5 15
+//!     clamp = true                     # of aov: corners of volumes at most 2 delta from the triangle's, as printed; default: false
 //!     ## rays = 256                     # of rays: rays of a pixel
 //!     ## samples = 16                   # of volumetric, hbao: texels that are read around a pixel, 1 to 1024
 //!     "##,
@@ -179,6 +180,8 @@ pub(crate) struct MeshOcclusionFile {
     rays: Option<i64>,
     sparse: Option<i64>,
     samples: Option<i64>,
+    #[serde(default)]
+    clamp: bool,
 }
 
 impl MeshOcclusionFile {
@@ -201,6 +204,7 @@ impl MeshOcclusionFile {
             rays: count("rays", self.rays, usual.rays)?,
             sparse: count("sparse", self.sparse, usual.sparse)?,
             samples: count("samples", self.samples, usual.samples)?,
+            clamp: self.clamp,
             ..usual
         };
         settings.check().map_err(|error| error.under(section))?;

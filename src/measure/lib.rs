@@ -15,6 +15,7 @@ pub mod planner;
 pub mod plot;
 pub mod random;
 pub mod reference;
+pub mod shown;
 pub mod split;
 pub mod ssim;
 pub mod stability;

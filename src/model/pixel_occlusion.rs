@@ -38,6 +38,8 @@ pub struct PixelEntry {
     pub rays: Option<u32>,
     /// Texels that are read around a pixel, as AOV §3 counts them: all of all directions; `None` of methods that read none.
     pub samples: Option<u32>,
+    /// Whether it has a volume a triangle, whose corners can be clamped.
+    pub volumes: bool,
     /// Distances of the pixels that can be computed, in pixels along each direction; the others are interpolated.
     pub sparse: &'static [u32],
 }
@@ -52,6 +54,7 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         world: true,
         rays: None,
         samples: None,
+        volumes: true,
         // AOV figure 9: 1, 1/9, 1/25 and 1/225 samples a pixel.
         sparse: &[1, 3, 5, 15],
     },
@@ -63,6 +66,7 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         world: true,
         rays: Some(256),
         samples: None,
+        volumes: false,
         sparse: &[1],
     },
     PixelEntry {
@@ -74,6 +78,7 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         rays: None,
         // 16, as published.
         samples: None,
+        volumes: false,
         sparse: &[1],
     },
     PixelEntry {
@@ -84,6 +89,7 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         world: false,
         rays: None,
         samples: Some(32),
+        volumes: false,
         sparse: &[1],
     },
     PixelEntry {
@@ -95,6 +101,7 @@ pub static PIXEL_METHODS: &[PixelEntry] = &[
         rays: None,
         // Six directions of six steps.
         samples: Some(36),
+        volumes: false,
         sparse: &[1],
     },
 ];
@@ -139,6 +146,9 @@ pub struct PixelOcclusion {
     pub sparse: u32,
     /// Texels that are read around a pixel, 1 … [`Self::MOST_SAMPLES`]; of methods that read any.
     pub samples: u32,
+    /// Whether corners of volumes are clamped to 2 δ from those of their triangles, as printed (AOV §5.2), which cuts off what corners from 60° on
+    /// occlude; of methods that have volumes.
+    pub clamp: bool,
 }
 
 impl Default for PixelOcclusion {
@@ -165,6 +175,7 @@ impl PixelOcclusion {
             rays: entry.rays.unwrap_or(1),
             sparse: 1,
             samples: entry.samples.unwrap_or(1),
+            clamp: false,
         }
     }
 
@@ -195,6 +206,9 @@ impl PixelOcclusion {
                 }
                 _ => {}
             }
+        }
+        if self.clamp && !entry.volumes {
+            return Err(Error::refused("clamp", format!("true: the method {name} has no volumes")));
         }
         if !entry.sparse.contains(&self.sparse) {
             let allowed: Vec<_> = entry.sparse.iter().map(u32::to_string).collect();
@@ -246,6 +260,10 @@ mod tests {
                 "samples: 1025: expected 1 to 1024",
             ),
             (PixelOcclusion { samples: 2, ..of(PixelMethod::Rays) }, "the method rays has no samples"),
+            (
+                PixelOcclusion { clamp: true, ..of(PixelMethod::Hbao) },
+                "clamp: true: the method hbao has no volumes",
+            ),
             (PixelOcclusion { sparse: 4, ..of(PixelMethod::Aov) }, "sparse: 4: expected 1, 3, 5, 15 of"),
             (
                 PixelOcclusion { sparse: 3, ..of(PixelMethod::Hbao) },

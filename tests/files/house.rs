@@ -398,7 +398,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("src/measure/reference.rs", &["failure", "kernels", "random"]),
     ("src/measure/contender/", &["failure", "kernels"]),
     ("src/measure/examples/", &["failure", "error", "random", "reference"]),
-    ("src/measure/stability/", &["failure", "error", "exactness", "flip", "plot", "random", "reference"]),
+    ("src/measure/shown.rs", &["failure"]),
+    (
+        "src/measure/stability/",
+        &["failure", "error", "exactness", "flip", "kernels", "plot", "random", "reference", "shown"],
+    ),
     (
         "src/measure/chart/",
         &[
@@ -407,9 +411,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "error",
             "exactness",
             "flip",
+            "kernels",
             "plot",
             "random",
             "reference",
+            "shown",
             "split",
             "ssim",
         ],

@@ -42,7 +42,7 @@ fn every_key_of_a_mesh_is_read() {
     encoder.write_header().unwrap().write_image_data(&[9, 9, 9, 200]).unwrap();
     put("t.png", &png);
     let text = "[[mesh]]\nfile = \"a.obj\"\ntranslate_mm = [1, 2, 3]\nrotate_deg = [0, 0, 90]\nscale = [2, 1, 1]\ncolour = \"#00ff00\"\n\
-                two_sided = false\nspared = true\n[[mesh]]\nbuiltin = \"level\"\ndetail = 1\n[mesh_occlusion]\nmethod = \"aov\"\ndelta_mm = 7\nsparse = 15\n";
+                two_sided = false\nspared = true\n[[mesh]]\nbuiltin = \"level\"\ndetail = 1\n[mesh_occlusion]\nmethod = \"aov\"\ndelta_mm = 7\nsparse = 15\nclamp = true\n";
     let scene = Scene::from_toml(text, folder.path()).unwrap();
     let instances = scene.meshes[0].instances().unwrap();
     let world = World::new(&instances).unwrap();
@@ -58,7 +58,12 @@ fn every_key_of_a_mesh_is_read() {
     assert_eq!(m.texture.as_ref().unwrap().texels, [[255, 255, 255, 200]], "its mask is left");
     assert_eq!((n.colour, n.two_sided, n.texture.is_none()), ([0.0, 1.0, 0.0], false, true));
     assert_eq!(scene.meshes[1].instances().unwrap()[0].surface.name, "level");
-    let expected = PixelOcclusion { delta_mm: Some(7.0), sparse: 15, ..PixelOcclusion::of(PixelMethod::Aov) };
+    let expected = PixelOcclusion {
+        delta_mm: Some(7.0),
+        sparse: 15,
+        clamp: true,
+        ..PixelOcclusion::of(PixelMethod::Aov)
+    };
     assert_eq!(scene.mesh_occlusion, expected);
     let of = |keys: &str| {
         read(&format!("[[mesh]]\nbuiltin = \"house\"\n[mesh_occlusion]\n{keys}")).unwrap().mesh_occlusion
@@ -127,6 +132,10 @@ fn what_is_wrong_with_meshes_is_refused_by_name() {
             "mesh_occlusion.sparse: 2: expected 1, 3, 5, 15 of the method aov",
         ),
         (&format!("{house}[mesh_occlusion]\nrays = 9"), "mesh_occlusion.rays: 9: the method aov has no rays"),
+        (
+            &format!("{house}[mesh_occlusion]\nmethod = \"crytek\"\nclamp = true"),
+            "mesh_occlusion.clamp: true: the method crytek has no volumes",
+        ),
         (
             &format!("{house}[mesh_occlusion]\nmethod = \"rays\"\nrays = -1"),
             "mesh_occlusion.rays: -1: expected",

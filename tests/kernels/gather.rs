@@ -2,13 +2,14 @@
 
 use cao::mesh::gather::{Blocks, Gather, Scene};
 use cao_gpu::Access;
-use cao_model::surface::Material;
-use cao_model::view::{Tangents, View};
-use cao_testing::worlds::{Pixels, corner, corner_eyes, cuboid, floats, sheet, world_of};
+use cao_model::surface::{Material, Surface};
+use cao_model::view::View;
+use cao_testing::worlds::{Pixels, ahead, corner, corner_eyes, cuboid, floats, sheet, world_of};
 use cao_testing::*;
-use cao_twin::mesh::gather::gathered;
+use cao_twin::mesh::gather::gathered_in;
 use cao_twin::mesh::gbuffer::gbuffer;
-use glam::{Quat, Vec3};
+use cao_twin::mesh::occluder::Volume;
+use glam::Vec3;
 
 /// No multiple of a workgroup.
 const SIZE: [u32; 2] = [45, 35];
@@ -20,7 +21,11 @@ const ERROR: f64 = 2e-4;
 const OTHER: f64 = 5e-3;
 
 fn sums_of(gpu: &cao_gpu::Gpu, pixels: &Pixels, delta: f32) -> Vec<f32> {
-    let volumes = pixels.surfaces.volumes(gpu, delta).unwrap();
+    sums_in(gpu, pixels, delta, false)
+}
+
+fn sums_in(gpu: &cao_gpu::Gpu, pixels: &Pixels, delta: f32, clamped: bool) -> Vec<f32> {
+    let volumes = pixels.surfaces.volumes(gpu, delta, clamped).unwrap();
     let (gather, accessibility) = (Gather::new(gpu).unwrap(), pixels.values(gpu));
     let scene =
         Scene { geometry: &pixels.geometry, surfaces: &pixels.surfaces, volumes: &volumes, delta_mm: delta };
@@ -33,36 +38,25 @@ fn every_pixel_is_as_the_twin_has_it() {
     let gpu = open();
     let (world, views) = (corner(), corner_eyes(SIZE));
     let pixels = Pixels::new(&gpu, &world, &views, SIZE);
-    for delta in [6.0, 40.0] {
-        let found = sums_of(&gpu, &pixels, delta);
+    for (delta, clamped) in [(6.0, false), (40.0, false), (40.0, true)] {
+        let found = sums_in(&gpu, &pixels, delta, clamped);
+        let volume = Volume { delta: f64::from(delta), clamped };
         let (mut other, mut all, mut darkest) = (0, 0, 1.0f64);
         for (view, eye) in views.iter().enumerate() {
             for (i, shown) in gbuffer(&world, &[], eye, SIZE).into_iter().enumerate() {
                 let found = f64::from(found[view * (SIZE[0] * SIZE[1]) as usize + i]);
-                let occlusion = shown.map_or(0.0, |s| gathered(&world, s.place, s.normal, f64::from(delta)));
+                let occlusion = shown.map_or(0.0, |s| gathered_in(&world, s.place, s.normal, volume));
                 let expected = 1.0 - occlusion.min(1.0);
                 darkest = darkest.min(expected);
                 all += 1;
                 other += u32::from((found - expected).abs() > ERROR);
             }
         }
-        assert!(f64::from(other) < OTHER * f64::from(all), "delta {delta}: {other} of {all}");
+        assert!(f64::from(other) < OTHER * f64::from(all), "{volume:?}: {other} of {all}");
         assert!(darkest < 0.7, "nothing to be seen: {darkest}");
     }
     drop(pixels);
     close(gpu);
-}
-
-/// A view straight along +y from `place`, of one pixel.
-fn ahead(place: Vec3) -> View {
-    View {
-        position: place,
-        orientation: Quat::from_rotation_x(std::f32::consts::FRAC_PI_2),
-        tan: Tangents { left: -0.01, right: 0.01, up: 0.01, down: -0.01 },
-        near_mm: 0.1,
-        far_mm: 1e5,
-        reversed: false,
-    }
 }
 
 /// What the issue asks of known answers.
@@ -109,7 +103,7 @@ fn blocks_are_their_middle_pixels() {
     let gpu = open();
     let pixels = Pixels::new(&gpu, &corner(), &corner_eyes(SIZE), SIZE);
     let full = sums_of(&gpu, &pixels, 40.0);
-    let volumes = pixels.surfaces.volumes(&gpu, 40.0).unwrap();
+    let volumes = pixels.surfaces.volumes(&gpu, 40.0, false).unwrap();
     let gather = Gather::new(&gpu).unwrap();
     for step in [3, 5, 15] {
         let blocks = Blocks::new(&gpu, &pixels.geometry, step).unwrap();
@@ -134,5 +128,45 @@ fn blocks_are_their_middle_pixels() {
         }
     }
     drop((pixels, volumes));
+    close(gpu);
+}
+
+#[test]
+fn corners_sharper_than_60_degrees_are_clamped() {
+    let gpu = open();
+    let (delta, far) = (2.0, Vec3::new(-30.0, 10.0, -30.0));
+    let wall = || sheet(far, Vec3::X * 60.0, Vec3::Z * 60.0, 1, Material::default());
+    // A corner at the middle, half its angle on either side of x, half of δ before the wall.
+    let corner = |angle: f32| {
+        let (sine, cosine) = (0.5 * angle.to_radians()).sin_cos();
+        let at = |z: f32| Vec3::new(10.0 * cosine, 9.0, 10.0 * sine * z);
+        let positions = vec![Vec3::new(0.0, 9.0, 0.0), at(1.0), at(-1.0)];
+        let material = Material { two_sided: true, ..Material::default() };
+        let (triangles, material_of) = (vec![[0, 1, 2]], vec![0]);
+        let materials = vec![material];
+        Surface { positions, triangles, material_of, materials, ..Surface::default() }
+    };
+    // How dark it is at a place beyond the corner, so many δ away.
+    let dark = |angle: f32, beyond: f32, clamped| {
+        let world = world_of(vec![wall(), corner(angle)]);
+        let view = ahead(Vec3::new(-beyond * delta, 9.5, 0.0));
+        1.0 - sums_in(&gpu, &Pixels::new(&gpu, &world, &[view], [1, 1]), delta, clamped)[0]
+    };
+    // Where δ from both edges is: 1 / sin of half the angle.
+    for (angle, reach) in [(90.0, std::f32::consts::SQRT_2), (60.0, 2.0), (45.0, 2.613_126)] {
+        for clamped in [false, true] {
+            let end = if clamped { reach.min(2.0) } else { reach };
+            let [within, beyond] = [0.98, 1.02].map(|share| dark(angle, share * end, clamped));
+            assert!(within > 0.0 && beyond == 0.0, "{angle} degrees, clamped {clamped}: {within}, {beyond}");
+        }
+    }
+    // What is left is what it was.
+    assert_eq!(dark(45.0, 1.9, true), dark(45.0, 1.9, false));
+    // A needle, of which the box is left where it is not clamped: beyond 2 δ nothing is.
+    let [boxed, clamped] = [false, true].map(|clamped| [0.9, 2.1].map(|beyond| dark(2.0, beyond, clamped)));
+    assert!(
+        boxed[0] > 0.0 && boxed[1] == 0.0 && clamped[0] > 0.0 && clamped[1] == 0.0,
+        "{boxed:?} {clamped:?}"
+    );
     close(gpu);
 }

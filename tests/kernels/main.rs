@@ -37,6 +37,7 @@ mod occupancy;
 mod ones;
 mod opacity;
 mod output;
+mod overdraw;
 mod pairs;
 mod peel;
 mod present;

@@ -28,13 +28,15 @@ fn occlusion(gpu: &Gpu, pixels: &Pixels, delta_mm: f32, method: &mut dyn PixelAm
     floats(gpu, &accessibility)
 }
 
-fn others(world: &World, delta: f32) -> f64 {
+fn others(world: &World, delta: f32, clamped: bool) -> f64 {
     let gpu = open();
     let pixels = Pixels::new(&gpu, world, &corner_eyes(SIZE), SIZE);
-    let expected = occlusion(&gpu, &pixels, delta, &mut ByVolumes::new(&gpu, 1).unwrap());
+    let gathered = ByVolumes::new(&gpu, 1).unwrap();
+    let expected = occlusion(&gpu, &pixels, delta, &mut gathered.clamped(clamped));
     let mut worst = 0.0f64;
     for is_static in [false, true] {
-        let found = occlusion(&gpu, &pixels, delta, &mut Volumes::new(&gpu, is_static).unwrap());
+        let drawn = Volumes::new(&gpu, is_static).unwrap();
+        let found = occlusion(&gpu, &pixels, delta, &mut drawn.clamped(clamped));
         let other = found.iter().zip(&expected).filter(|(a, b)| (**a - **b).abs() > ROUNDING).count();
         worst = worst.max(other as f64 / found.len() as f64);
     }
@@ -46,15 +48,15 @@ fn others(world: &World, delta: f32) -> f64 {
 
 #[test]
 fn what_is_drawn_is_what_is_gathered() {
-    for delta in [6.0, 40.0] {
-        let other = others(&corner(), delta);
-        assert!(other < OTHER, "delta {delta}: {other}");
+    for (delta, clamped) in [(6.0, false), (40.0, false), (40.0, true)] {
+        let other = others(&corner(), delta, clamped);
+        assert!(other < OTHER, "delta {delta}, clamped {clamped}: {other}");
     }
 }
 
 #[test]
 fn eyes_inside_volumes_see_them() {
     // Volumes of 150 mm hold both eyes, and all of the room.
-    let other = others(&corner(), 150.0);
+    let other = others(&corner(), 150.0, false);
     assert!(other < OTHER, "{other}");
 }

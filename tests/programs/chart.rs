@@ -5,7 +5,8 @@ use cao::renderer::{COLOUR, Renderer};
 use cao_measure::chart::looks::{self, ERRORS};
 use cao_measure::chart::peers::Peers;
 use cao_measure::chart::{
-    Chart, Plan, Scene, csv, deep, draw, features, foresee, looks_draw, measure, paper, report,
+    Chart, Plan, Scene, csv, deep, draw, features, foresee, looks_draw, measure, meshes, meshes_panel, paper,
+    report,
 };
 use cao_measure::contender::{self, Arena, Asked, BASELINE, Change, State};
 use cao_measure::reference;
@@ -64,8 +65,10 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     let scenes = [scene("engine", 18), scene("fruit", 16)];
     let foreseen = foresee(&gpu, &scenes, &plan()).unwrap();
     let start = Instant::now();
-    let chart = measure(&gpu, &scenes, &plan(), &mut |_, share| shares.push(share)).unwrap();
+    let mut chart = measure(&gpu, &scenes, &plan(), &mut |_, share| shares.push(share)).unwrap();
     let minutes = start.elapsed().as_secs_f64() / 60.0;
+    let plan = meshes::Plan { size: [24, 14], rays: 8, runs: RUNS, detail: Some(1), sought: false };
+    chart.meshes = Some(meshes::measure(&gpu, &plan, Vec::new(), &mut |_, _| ()).unwrap());
     close(gpu);
     // Machines do other things meanwhile, and small scenes have more of everything that is not counted.
     let off = foreseen.minutes / minutes;
@@ -84,6 +87,28 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     drawings_are_well_formed_and_show_every_method_and_change(&chart);
     the_report_stands_alone_and_has_every_part(&chart);
     the_picture_is_drawn_in_every_way_and_more_work_errs_less(&chart);
+    meshes_have_a_panel_of_their_own(&chart);
+}
+
+/// Over all scenes; one alone has none, nor a chart for which none was measured.
+fn meshes_have_a_panel_of_their_own(chart: &Chart) {
+    const TITLE: &str = "meshes: 7 scenes";
+    let scenes: Vec<_> = chart.scenes.iter().collect();
+    let svg = |chart: &Chart, scenes: &[&_]| draw::draw(chart, scenes, &chart.caption()).svg();
+    let with = svg(chart, &scenes);
+    assert!(with.contains(TITLE) && with.contains("AOV, clamped") && with.contains("24 x 14"), "{with}");
+    let without = Chart { meshes: None, ..chart.clone() };
+    assert!(!svg(&without, &scenes).contains("meshes") && !svg(chart, &scenes[..1]).contains(TITLE));
+    let page = |chart| report::html(chart, "a machine", "cao chart", None).unwrap();
+    assert!(page(chart).contains("Meshes: time against error") && page(chart).contains("colonnade"));
+    assert!(!page(&without).contains("Meshes:"));
+    // Nothing beats what is on its front, which is not all there is.
+    let found = chart.meshes.as_ref().unwrap();
+    let marks = meshes_panel::marks(&found.built().collect::<Vec<_>>(), true);
+    let front = meshes_panel::front_of(&marks);
+    assert!(!front.is_empty() && front.len() < marks.len());
+    let beats = |a: &meshes_panel::Mark, b: &meshes_panel::Mark| a.time[1] <= b.time[1] && a.error < b.error;
+    assert!(front.iter().all(|&i| !marks.iter().any(|other| beats(other, &marks[i]))));
 }
 
 /// Sizes of a sixteenth: what is tested is that everything is there and belongs together.

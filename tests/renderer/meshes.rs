@@ -18,12 +18,14 @@ use glam::Vec3;
 /// No multiple of a workgroup, nor of a block.
 const SIZE: [u32; 2] = [77, 59];
 
-/// Every method as its entry has it, with fewer rays, and at every distance of pixels.
+/// Every method as its entry has it, with fewer rays, and at every distance of pixels; of volumes those whose corners are clamped, too.
 fn settings() -> Vec<PixelOcclusion> {
     let of = |entry: &cao_model::pixel_occlusion::PixelEntry| {
         let usual = PixelOcclusion { delta_mm: Some(30.0), ..PixelOcclusion::of(entry.method) };
         let rays = usual.rays.min(20);
-        entry.sparse.iter().map(move |&sparse| PixelOcclusion { sparse, rays, ..usual }).collect::<Vec<_>>()
+        let clamped = entry.volumes.then_some(PixelOcclusion { clamp: true, ..usual });
+        let sparse = entry.sparse.iter().map(move |&sparse| PixelOcclusion { sparse, rays, ..usual });
+        sparse.chain(clamped).collect::<Vec<_>>()
     };
     PIXEL_METHODS.iter().flat_map(of).collect()
 }

@@ -7,8 +7,8 @@ use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
 use cao_model::settings::MapSettings;
 use cao_model::surface::{Instance, Material, Surface, Texture, World};
-use cao_model::view::{StereoRig, View};
-use glam::{Vec2, Vec3};
+use cao_model::view::{StereoRig, Tangents, View};
+use glam::{Quat, Vec2, Vec3};
 use std::sync::Arc;
 
 /// A parallelogram of 2·n² triangles, counter-clockwise from `u` to `v`.
@@ -105,6 +105,18 @@ pub fn corner_eyes(size: [u32; 2]) -> [View; 2] {
         screen_mm: None,
     };
     rig.views(size[0] as f32 / size[1] as f32, 1.0, 1000.0).unwrap()
+}
+
+/// A view straight along +y from `place`, of one pixel.
+pub fn ahead(place: Vec3) -> View {
+    View {
+        position: place,
+        orientation: Quat::from_rotation_x(std::f32::consts::FRAC_PI_2),
+        tan: Tangents { left: -0.01, right: 0.01, up: 0.01, down: -0.01 },
+        near_mm: 0.1,
+        far_mm: 1e5,
+        reversed: false,
+    }
 }
 
 /// A world on the device and what views show of it.

@@ -78,8 +78,8 @@ impl Gather {
             first_row: 0,
             rows: 0,
             groups: 0,
-            pad: Default::default(),
             delta: scene.delta_mm,
+            clamped: u32::from(scene.volumes.clamped),
         }
     }
 

@@ -10,6 +10,7 @@ use crate::mesh::shares::Shares;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
 use cao_gpu::{Access, Buffer, Gpu};
+use cao_kernels::gather::CLAMP;
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
 use cao_model::clip::Clip;
@@ -48,6 +49,8 @@ pub struct Surfaces {
 pub struct VolumeTree {
     /// Bound as `tree`.
     pub tree: Buffer,
+    /// Whether they end where their corners are clamped.
+    pub clamped: bool,
 }
 
 impl Surfaces {
@@ -127,11 +130,11 @@ impl Surfaces {
         Ok(())
     }
 
-    /// The tree of what each triangle may occlude within `delta_mm`. Uses the device's queue and waits for it.
+    /// The tree of what each triangle may occlude within `delta_mm`; with corners `clamped` as printed. Uses the device's queue and waits for it.
     ///
     /// # Errors
     /// A reach that is no length; a device without memory.
-    pub fn volumes(&self, gpu: &Gpu, delta_mm: f32) -> Result<VolumeTree> {
+    pub fn volumes(&self, gpu: &Gpu, delta_mm: f32, clamped: bool) -> Result<VolumeTree> {
         if !(delta_mm.is_finite() && delta_mm > 0.0) {
             return Err(Error::refused("delta_mm", format!("{delta_mm}; expected a length > 0 mm")));
         }
@@ -139,17 +142,18 @@ impl Surfaces {
             .ordered
             .iter()
             .zip(&self.two_sided)
-            .map(|(triangle, two_sided)| volume_box(triangle.corners, delta_mm, *two_sided))
+            .map(|(triangle, two_sided)| volume_box(triangle.corners, delta_mm, *two_sided, clamped))
             .collect();
         // The tree names items by the order of the world; here they lie in the order of its leaves.
         let in_place = Bvh { nodes: self.nodes.clone(), order: (0..boxes.len() as u32).collect() };
         let nodes = in_place.refit(&boxes);
-        Ok(VolumeTree { tree: device_buffer(gpu, "tree of volumes", bytemuck::cast_slice(&packed(&nodes)))? })
+        let tree = device_buffer(gpu, "tree of volumes", bytemuck::cast_slice(&packed(&nodes)))?;
+        Ok(VolumeTree { tree, clamped })
     }
 }
 
-/// Corners that stick out of a volume farther than this, in deltas, make it a sliver's (AOV §5.2 clamps at 2, which cuts volumes where
-/// falloff is above 0: a corner of 60° already asks for 2).
+/// Corners that stick out of a volume farther than this, in deltas, make it a sliver's, unless they are clamped (AOV §5.2: at 2, which cuts
+/// volumes where falloff is above 0: a corner of 60° already asks for 2).
 const MOST_MITRE: f32 = 4.0;
 
 /// The inward normals of a triangle's edges, from each corner to the next (AOV eq. 22), and the normal of its face.
@@ -166,11 +170,24 @@ pub fn is_sliver(corners: [Vec3; 3]) -> bool {
     (0..3).any(|i| sharp(i) < 1.0 / (MOST_MITRE * MOST_MITRE))
 }
 
-/// The box of a triangle's occlusion volume: its prism (eq. 23 to 29), or of a sliver that of its box in its plane.
-pub fn volume_box(corners: [Vec3; 3], delta: f32, two_sided: bool) -> Bounds {
+/// The corner of a clamped volume that is `corner`'s, between the one `before` and the `next`: at most [`CLAMP`] deltas from it.
+fn clamped_corner([before, corner, next]: [Vec3; 3], face: Vec3, delta: f32) -> Vec3 {
+    let (along_next, along_before) =
+        ((next - corner).normalize_or_zero(), (corner - before).normalize_or_zero());
+    let inward = face.cross(along_next) + face.cross(along_before);
+    // Twice the sine of half the corner's angle.
+    let away = (2.0 / inward.length()).min(CLAMP);
+    corner - (inward + along_next - along_before).normalize_or_zero() * (away * delta)
+}
+
+/// The box of a triangle's occlusion volume: its prism (eq. 23 to 29), whose corners may be `clamped`; or of a sliver that of its box in its plane.
+pub fn volume_box(corners: [Vec3; 3], delta: f32, two_sided: bool, clamped: bool) -> Bounds {
     let (inward, face) = edges(corners);
     let mut base = Vec::with_capacity(4);
-    if is_sliver(corners) {
+    if clamped {
+        let [a, b, c] = corners;
+        base.extend([[c, a, b], [a, b, c], [b, c, a]].map(|around| clamped_corner(around, face, delta)));
+    } else if is_sliver(corners) {
         let [a, b, c] = corners;
         let along = [b - a, c - b, a - c].into_iter().fold(Vec3::ZERO, |longest, edge| {
             if edge.length_squared() > longest.length_squared() { edge } else { longest }

@@ -12,6 +12,7 @@ use cao_gpu::{
     ImageDesc, ImageKind, ImageUse, Pipeline, Recorder,
 };
 use cao_kernels::volumes as kernel;
+use cao_model::surface::Triangle;
 
 /// Vertices of a prism, and of a box.
 const PRISM: u32 = 24;
@@ -26,6 +27,7 @@ pub struct Volumes {
     settle: Pipeline,
     /// Corners are made once, and not by each vertex.
     is_static: bool,
+    clamped: bool,
     world: Option<Ready>,
 }
 
@@ -78,11 +80,22 @@ impl Volumes {
             )?,
             settle: gpu.compute(&kernel::SHADER, "settle")?,
             is_static,
+            clamped: false,
             world: None,
         })
     }
 
-    fn params(on: &Pixels, view: u32, corners: u32, first: u32, count: u32) -> kernel::VolumesParams {
+    /// With corners that are clamped as printed (AOV §5.2), before it is prepared.
+    pub fn clamped(self, clamped: bool) -> Self {
+        Self { clamped, ..self }
+    }
+
+    /// Whether a triangle's volume is a box.
+    fn is_box(&self, triangle: &Triangle) -> bool {
+        !self.clamped && is_sliver(triangle.corners)
+    }
+
+    fn params(&self, on: &Pixels, view: u32, corners: u32, first: u32, count: u32) -> kernel::VolumesParams {
         kernel::VolumesParams {
             size: on.geometry.size(),
             view,
@@ -90,7 +103,7 @@ impl Volumes {
             first,
             count,
             delta: on.delta_mm,
-            pad: Default::default(),
+            clamped: u32::from(self.clamped),
         }
     }
 
@@ -107,7 +120,7 @@ impl Volumes {
         let attachments =
             Attachments { colours: &[], depth: Some((&world.depths, None)), layer: None, at: [0; 2], size };
         let binds = kernel::WholeDepthBindings { eyes: &geometry.eyes, geometry: &geometry.pixels };
-        let params = Self::params(on, view, 0, 0, 0);
+        let params = self.params(on, view, 0, 0, 0);
         rec.draw(&self.depth, &binds, bytemuck::bytes_of(&params), attachments, 3)?;
         rec.barrier(&[Access::AttachmentWrite], &[Access::AttachmentWrite]);
         let mut clear = Some([0.0; 4]);
@@ -119,7 +132,7 @@ impl Volumes {
                 continue;
             }
             let attachments = Attachments { colours: &[(&world.sums, clear.take())], ..attachments };
-            let params = Self::params(on, view, corners, first, count);
+            let params = self.params(on, view, corners, first, count);
             let push = bytemuck::bytes_of(&params);
             if let Some(made) = &world.made {
                 let binds = kernel::StaticVolumeOccludeBindings {
@@ -145,18 +158,18 @@ impl Volumes {
         }
         rec.barrier(&[Access::AttachmentWrite], &[Access::SampledRead]);
         let binds = kernel::SettleBindings { sums: Flat::Only(&world.sums), accessibility };
-        let params = Self::params(on, view, 0, 0, 0);
+        let params = self.params(on, view, 0, 0, 0);
         Ok(rec.dispatch_over(&self.settle, &binds, bytemuck::bytes_of(&params), [size[0], size[1], 1])?)
     }
 }
 
 impl PixelAmbient for Volumes {
     fn prepare(&mut self, on: &Pixels) -> Result<()> {
-        let Pixels { gpu, geometry, surfaces, delta_mm } = *on;
+        let Pixels { gpu, geometry, surfaces, .. } = *on;
         let mut items: Vec<u32> = (0..surfaces.ordered.len() as u32).collect();
         // Stable: of each kind the order of the tree, which is that of places.
-        items.sort_by_key(|item| is_sliver(surfaces.ordered[*item as usize].corners));
-        let boxes = surfaces.ordered.iter().filter(|triangle| is_sliver(triangle.corners)).count() as u32;
+        items.sort_by_key(|item| self.is_box(&surfaces.ordered[*item as usize]));
+        let boxes = surfaces.ordered.iter().filter(|triangle| self.is_box(triangle)).count() as u32;
         let count = items.len() as u32;
         if count.checked_mul(BOX).is_none() {
             let problem =
@@ -180,7 +193,7 @@ impl PixelAmbient for Volumes {
         };
         if self.is_static {
             let made = gpu.buffer("corners of volumes", 128 * u64::from(count), BufferUse::Device)?;
-            let params = kernel::VolumesParams { delta: delta_mm, ..Self::params(on, 0, 0, 0, count) };
+            let params = self.params(on, 0, 0, 0, count);
             let binds = kernel::CornersBindings {
                 items: &ready.items,
                 triangles: &surfaces.triangles,

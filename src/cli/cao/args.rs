@@ -118,7 +118,8 @@ Examples:
                                           times, with its pictures
   cao chart --dvao -o network             a network beside rays, Table 3 of its paper
   cao chart --meshes -o meshes            ambient occlusion of meshes beside rays,
-                                          figures 9 to 11 of its paper
+                                          figures 5 and 9 to 11 of its paper
+  cao chart --meshes --data bunny.obj -o meshes
 
 Writes report.html, which stands alone; chart.svg, chart.png and runs.csv, every
 run of every method; the same of the picture's own settings, pictures.*. A scene without clips gets a ball.";
@@ -375,7 +376,7 @@ pub struct Chart {
     /// With --dvao: weight file of another network, for either truth [default: the one that is built in]
     #[arg(long, value_name = "FILE", value_parser = network, requires = "dvao")]
     pub network: Option<Network>,
-    /// Figures 9 to 11 of the paper of ambient occlusion volumes instead: seven scenes of meshes, its methods and rays, time against error
+    /// Figures 5 and 9 to 11 of the paper of ambient occlusion volumes instead: seven scenes of meshes, its methods and rays, time against error
     #[arg(long, conflicts_with_all = ["scenes", "peers", "transfer", "radius_mm", "paper", "fdao", "dvao"])]
     pub meshes: bool,
     /// With --meshes: pixels of the view [default: 1280x720, on a software driver 160x90, with --quick 48x27]
@@ -384,8 +385,9 @@ pub struct Chart {
     /// With --meshes: rays a pixel of the reference [default: 5000, on a software driver 1000, with --quick 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65536), requires = "meshes")]
     pub rays: Option<u32>,
-    /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms
-    #[arg(long, value_name = "FILE", requires = "paper")]
+    /// With --paper: a volume for its engine, its beetle, its skeleton, in this order, instead of phantoms; with --meshes: scans (.obj, .gltf, .glb) as
+    /// scenes beside the seven, each on a ground
+    #[arg(long, value_name = "FILE")]
     pub data: Vec<OsString>,
     /// A peers.json of tools/peers, for a table of other systems in the report
     #[arg(long, value_name = "FILE")]

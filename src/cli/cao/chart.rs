@@ -7,8 +7,9 @@ use cao_cli::targets::Targets;
 use cao_measure::chart;
 use cao_measure::chart::front::quartiles;
 use cao_measure::chart::looks::{self, ERRORS, Looks};
+use cao_measure::chart::meshes_scenes::MeshScene;
 use cao_measure::chart::peers::Peers;
-use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, report};
+use cao_measure::chart::{Chart, Plan, Scene, csv, draw, looks_draw, meshes, meshes_panel, report};
 use cao_measure::contender::{Change, State};
 use cao_measure::reference;
 use cao_model::error::shown_path;
@@ -26,9 +27,17 @@ const DEFAULT_RADIUS: f32 = 8.0;
 const QUICK: [&str; 3] = ["builtin:engine:22", "builtin:fruit:22", "builtin:skeleton:22"];
 const QUICK_RADIUS: f32 = 4.0;
 
-/// What is written.
-const FILES: [&str; 7] =
-    ["runs.csv", "chart.svg", "chart.png", "pictures.csv", "pictures.svg", "pictures.png", "report.html"];
+/// What is written; the last where meshes have a panel.
+const FILES: [&str; 8] = [
+    "runs.csv",
+    "chart.svg",
+    "chart.png",
+    "pictures.csv",
+    "pictures.svg",
+    "pictures.png",
+    "report.html",
+    "meshes.csv",
+];
 
 /// What `--paper` writes.
 const PAPER: [&str; 10] = [
@@ -51,11 +60,14 @@ const FDAO: [&str; 5] = ["features.html", "features.csv", "figure-1.png", "figur
 const DVAO: [&str; 3] = ["network.html", "network.csv", "figure-8.png"];
 
 /// What `--meshes` writes.
-const MESHES: [&str; 7] = [
+const MESHES: [&str; 10] = [
     "meshes.html",
     "meshes.csv",
     "fits.csv",
     "verdicts.csv",
+    "meshes.svg",
+    "meshes.png",
+    "figure-5.png",
     "figure-10.svg",
     "figure-10.png",
     "figure-11.png",
@@ -65,6 +77,9 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
     // One folder is made; a longer way that is not there is a slip.
     if let Some(around) = args.output.parent().filter(|around| **around != *"" && !around.is_dir()) {
         bail!("cannot write {}: there is no folder {}", shown_path(&args.output), shown_path(around));
+    }
+    if !(args.data.is_empty() || args.paper || args.meshes) {
+        return Err(usage("--data: has no effect without --paper or --meshes"));
     }
     if args.paper {
         return paper(global, args);
@@ -76,9 +91,12 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
         return dvao(global, args);
     }
     if args.meshes {
-        return meshes(global, args);
+        return only_meshes(global, args);
     }
-    let targets = Targets::in_folder(&args.output, FILES.map(str::to_owned))?;
+    // Scenes of one's own are not what meshes are measured on.
+    let has_meshes = args.scenes.is_empty();
+    let files = FILES.into_iter().take(FILES.len() - usize::from(!has_meshes));
+    let targets = Targets::in_folder(&args.output, files.map(str::to_owned))?;
     let peers = args.peers.as_deref().map(read_peers).transpose()?;
     let mut progress = Progress::default();
     progress.stage("reading");
@@ -97,17 +115,25 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
         ));
     }
     progress.stage("measuring");
-    let chart = chart::measure(&gpu, &scenes, &plan, &mut |what, share| {
+    let mut chart = chart::measure(&gpu, &scenes, &plan, &mut |what, share| {
         progress.say(what);
         progress.set(share);
     })?;
+    if has_meshes {
+        progress.stage("measuring meshes");
+        let plan = meshes::Plan::panel(&gpu, args.quick, args.runs);
+        chart.meshes = Some(meshes::measure(&gpu, &plan, Vec::new(), &mut |what, share| {
+            progress.say(what);
+            progress.set(share);
+        })?);
+    }
     check_validation(&gpu)?;
     progress.stage("writing");
     let caption = chart.caption();
     let every: Vec<_> = chart.scenes.iter().collect();
     let drawing = draw::draw(&chart, &every, &caption);
     let pictures = looks_draw::draw(&chart);
-    let contents = [
+    let mut contents = vec![
         csv::runs(&chart).into_bytes(),
         drawing.svg().into_bytes(),
         drawing.png()?,
@@ -116,6 +142,7 @@ pub fn run(global: &Global, args: &Args) -> Result<ExitCode> {
         pictures.png()?,
         report::html(&chart, &machine(), &command(), peers.as_ref())?.into_bytes(),
     ];
+    contents.extend(chart.meshes.as_ref().map(|found| found.runs().into_bytes()));
     targets.write_all(&contents)?;
     drop(progress);
 
@@ -261,27 +288,33 @@ fn dvao(global: &Global, args: &Args) -> Result<ExitCode> {
 }
 
 /// `--meshes`.
-fn meshes(global: &Global, args: &Args) -> Result<ExitCode> {
+fn only_meshes(global: &Global, args: &Args) -> Result<ExitCode> {
     let targets = Targets::in_folder(&args.output, MESHES.map(str::to_owned))?;
     let mut progress = Progress::default();
+    progress.stage("reading");
+    let scans = args.data.iter().map(|name| MeshScene::scan(Path::new(name))).collect::<Result<_, _>>()?;
+    targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
-    let plan = chart::meshes::Plan::of(&gpu, args.quick, args.size, args.rays, args.runs);
+    let plan = meshes::Plan::of(&gpu, args.quick, args.size, args.rays, args.runs);
     progress.stage("measuring");
-    let found = chart::meshes::measure(&gpu, &plan, &mut |what, share| {
+    let found = meshes::measure(&gpu, &plan, scans, &mut |what, share| {
         progress.say(what);
         progress.set(share);
     })?;
     check_validation(&gpu)?;
     progress.stage("writing");
-    let panel = found.figure_10();
+    let (panels, figure_10) = (meshes_panel::draw(&found), meshes_panel::figure_10(&found));
     targets.write_all(&[
         found.html(&machine(), &command())?.into_bytes(),
         found.runs().into_bytes(),
         found.fitted().into_bytes(),
         found.judged().into_bytes(),
-        panel.svg().into_bytes(),
-        panel.png()?,
+        panels.svg().into_bytes(),
+        panels.png()?,
+        found.figure_5().png()?,
+        figure_10.svg().into_bytes(),
+        figure_10.png()?,
         found.figure_11().png()?,
     ])?;
     drop(progress);
@@ -294,7 +327,7 @@ fn meshes(global: &Global, args: &Args) -> Result<ExitCode> {
     let rows: Vec<_> = rows
         .map(|(scene, row)| {
             json!({
-                "scene": scene.scene.name, "method": row.of.name(plan.rays), "printed": row.of.printed(scene.scene.name),
+                "scene": scene.scene.name, "method": row.of.name(plan.rays), "printed": row.of.printed(&scene.scene.name),
                 "error": row.error, "rmse": row.rmse, "ms": row.median(), "over_aov": scene.ratio(row.of)
             })
         })
@@ -408,6 +441,9 @@ fn summary(out: &mut Out, chart: &Chart) {
             ));
         }
     }
+    if let Some(found) = &chart.meshes {
+        summary_of_meshes(out, found);
+    }
     for scene in &chart.scenes {
         scene.left_out.iter().for_each(|left_out| out.line(format!("{}: {left_out}", scene.name)));
     }
@@ -457,4 +493,25 @@ fn summary(out: &mut Out, chart: &Chart) {
     out.json(json!({
         "quoted_as": if ratios { "ratio" } else { "ms" }, "points": points, "left_out": left_out, "pictures": pictures
     }));
+}
+
+fn summary_of_meshes(out: &mut Out, found: &meshes::Found) {
+    let unit = if found.software { "x" } else { "ms" };
+    out.line(format!("meshes: Pareto front, time in {unit}"));
+    let marks = meshes_panel::marks(&found.built().collect::<Vec<_>>(), found.software);
+    for mark in meshes_panel::front_of(&marks).into_iter().map(|i| &marks[i]) {
+        let [low, time, high] = mark.time;
+        out.line(format!(
+            "  {:<27} {time:>9.4} {unit} ({low:.4} … {high:.4})   error {:.2}",
+            mark.of.name(found.plan.rays),
+            mark.error
+        ));
+    }
+    let marks: Vec<_> = marks
+        .iter()
+        .map(
+            |mark| json!({ "method": mark.of.name(found.plan.rays), "time": mark.time, "error": mark.error }),
+        )
+        .collect();
+    out.json(json!({ "meshes": marks }));
 }

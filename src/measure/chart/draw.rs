@@ -1,10 +1,11 @@
 //! The chart as a drawing: one panel for each kind of change, time against error, both logarithmic, the Pareto front drawn.
 //!
 //! Colours are methods, shapes rules along the rays, hollow marks equal weights; whiskers are quartiles. Where there are
-//! several scenes a mark is the geometric mean of their times and the root of the mean of their squared errors.
+//! several scenes a mark is the geometric mean of their times and the root of the mean of their squared errors. Meshes have a panel of their own below, where they
+//! were measured.
 
 use super::front::front;
-use super::{Change, Chart, Point, SceneChart};
+use super::{Change, Chart, Point, SceneChart, meshes_panel};
 use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short, text_width};
 use cao_model::occlusion::Quadrature;
 
@@ -95,7 +96,14 @@ pub fn time_label(ratios: bool) -> &'static str {
 /// Draws the chart of these scenes, `caption` below it, one entry a line.
 pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawing {
     let ratios = chart.software;
-    let legend_top = TOP + 2.0 * FRAME[1] + BETWEEN[1] + 62.0;
+    // They are no part of one scene alone.
+    let meshes = chart.meshes.as_ref().filter(|_| scenes.len() == chart.scenes.len());
+    let place = |n: usize| {
+        let (column, row) = ((n % 2) as f64, (n / 2) as f64);
+        [LEFT + column * (FRAME[0] + BETWEEN[0]), TOP + row * (FRAME[1] + BETWEEN[1])]
+    };
+    let last = Change::ALL.len() - usize::from(meshes.is_none());
+    let legend_top = place(last)[1] + FRAME[1] + 62.0;
     let methods = methods(scenes);
     let caption_top = legend_top + legend_height(&methods);
     let height = caption_top + 15.0 * caption.len() as f64 + 10.0;
@@ -114,11 +122,12 @@ pub fn draw(chart: &Chart, scenes: &[&SceneChart], caption: &[String]) -> Drawin
     let x = Axis::log(time_label(ratios), every().flat_map(|mark| mark.time));
     let y = Axis::log("error: RMSE of the ambient factor", every().map(|mark| mark.error));
     for (n, (change, marks)) in panels.iter().enumerate() {
-        let (column, row) = ((n % 2) as f64, (n / 2) as f64);
-        let at = [LEFT + column * (FRAME[0] + BETWEEN[0]), TOP + row * (FRAME[1] + BETWEEN[1])];
-        let panel = Panel { at, size: FRAME, x: x.clone(), y: y.clone() };
+        let panel = Panel { at: place(n), size: FRAME, x: x.clone(), y: y.clone() };
         panel.draw(&mut drawing, change.name());
         fill(&mut drawing, &panel, marks, &methods);
+    }
+    if let Some(found) = meshes {
+        meshes_panel::panel(&mut drawing, place(last), FRAME, BETWEEN[0], found);
     }
     legend(&mut drawing, legend_top, &methods);
     for (n, line) in caption.iter().enumerate() {

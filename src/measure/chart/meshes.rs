@@ -1,25 +1,29 @@
-//! The comparison of ambient occlusion volumes with ray tracing and with methods of image space (AOV §6, Fig. 5, 9, 10, 11) rebuilt: seven scenes by the
-//! rows of Fig. 9, milliseconds and the error of eq. (31) of accessibility in 8 bits, against rays.
+//! The comparison of ambient occlusion volumes with ray tracing and with methods of image space (AOV §6, Fig. 5, 9, 10, 11) rebuilt: seven scenes, and scans
+//! that one has, by the rows of Fig. 9, milliseconds and the error of eq. (31) of accessibility in 8 bits, against rays.
 //!
 //! All have one G-buffer of the left eye alone, and compute its accessibility and nothing else, as in the paper. Rows of rays are not part of the reference's
 //! rays: they are those of a second view of the same pixels, whose shifts are others; only the reference's own first half is a part of it. Times are
 //! timestamps of the phase `Ambient`. Cost on two cores at 160 × 90 with 1,000 rays: some minutes.
 
 use super::front::quartiles;
+use super::meshes_overdraw::Overdraw;
 use super::meshes_printed::{FIGURE_9, Printed};
+use super::meshes_scenes::{About, MeshScene};
 use crate::Result;
 use crate::error::{Accessibility, aov_error, errors};
+use crate::kernels::overdraw::Overdraw as Counter;
+use crate::shown::shown;
 use cao::host::read_buffer;
 use cao::image_space::method::ByImage;
 use cao::mesh::ambient::{ByRays, ByVolumes, PixelAmbient, Pixels};
-use cao::mesh::gbuffer::Gbuffer;
+use cao::mesh::gather::Scene;
 use cao::mesh::geometry::Geometry;
 use cao::mesh::surfaces::Surfaces;
 use cao::mesh::volumes::Volumes;
 use cao_formats::Picture;
-use cao_gpu::{Access, Buffer, BufferUse, DeviceKind, Gpu, Phase};
+use cao_gpu::{Access, Buffer, DeviceKind, Gpu, Phase};
 use cao_model::image_space::{Crytek, Hbao, ImageMethod, Volumetric};
-use cao_model::scenes::{BuiltScene, SCENES};
+use cao_model::scenes::SCENES;
 use cao_model::surface::World;
 use cao_model::view::View;
 
@@ -34,6 +38,8 @@ pub struct Plan {
     pub runs: u32,
     /// The scenes' detail where it is not their own.
     pub detail: Option<u32>,
+    /// Whether the best δ is sought, a quarter of it all.
+    pub sought: bool,
 }
 
 impl Plan {
@@ -45,7 +51,16 @@ impl Plan {
             (_, true) => ([160, 90], 1000),
             _ => ([1280, 720], PRINTED_RAYS),
         };
-        Self { size: size.unwrap_or(pixels), rays: rays.unwrap_or(most), runs, detail: quick.then_some(1) }
+        let (size, rays, detail) = (size.unwrap_or(pixels), rays.unwrap_or(most), quick.then_some(1));
+        Self { size, rays, runs, detail, sought: true }
+    }
+
+    /// For a panel of the chart beside all others, at a small part of their time.
+    pub fn panel(gpu: &Gpu, quick: bool, runs: u32) -> Self {
+        let software = gpu.info().kind == DeviceKind::Cpu;
+        let (size, rays) = if software { ([96, 54], 256) } else { ([640, 360], 1000) };
+        let first = Self::of(gpu, quick, (!quick).then_some(size), (!quick).then_some(rays), runs);
+        Self { detail: quick.then_some(1), sought: false, ..first }
     }
 }
 
@@ -73,6 +88,8 @@ pub enum Of {
         /// Made beforehand.
         is_static: bool,
     },
+    /// Volumes gathered whose corners are clamped to 2 δ, as printed.
+    Clamped,
     /// Volumetric AO with so many lines.
     Volumetric(u32),
     /// Crytek SSAO.
@@ -82,7 +99,7 @@ pub enum Of {
 }
 
 /// All rows, the reference first.
-pub const ROWS: [Of; 17] = [
+pub const ROWS: [Of; 18] = [
     Of::Rays(PRINTED_RAYS),
     Of::Rays(PRINTED_RAYS / 2),
     Of::Rays(1941),
@@ -91,6 +108,7 @@ pub const ROWS: [Of; 17] = [
     Of::Gathered(1),
     Of::Drawn { is_static: true },
     Of::Drawn { is_static: false },
+    Of::Clamped,
     Of::Gathered(3),
     Of::Gathered(5),
     Of::Gathered(15),
@@ -125,6 +143,7 @@ impl Of {
             Self::Gathered(step) => format!("AOV, 1/{} 5x5", step * step),
             Self::Drawn { is_static: true } => "AOV, 1, drawn, static".into(),
             Self::Drawn { is_static: false } => "AOV, 1, drawn, dynamic".into(),
+            Self::Clamped => "AOV, 1, clamped at 2 δ".into(),
             Self::Volumetric(samples) => format!("Volumetric, {samples}"),
             Self::Crytek => "Crytek, 16 4x4".into(),
             Self::Hbao => "HBAO, 16 directions 15x15".into(),
@@ -139,7 +158,7 @@ impl Of {
     /// δ over that of rays.
     pub fn factor(self) -> f32 {
         match self {
-            Self::Gathered(_) | Self::Drawn { .. } => FACTORS[0],
+            Self::Gathered(_) | Self::Drawn { .. } | Self::Clamped => FACTORS[0],
             Self::Volumetric(_) => FACTORS[1],
             Self::Rays(_) | Self::Crytek | Self::Hbao => 1.0,
         }
@@ -151,6 +170,7 @@ impl Of {
             Self::Rays(part) => return Ok(Box::new(ByRays::new(gpu, Self::rays(part, all))?)),
             Self::Gathered(step) => return Ok(Box::new(ByVolumes::new(gpu, step)?)),
             Self::Drawn { is_static } => return Ok(Box::new(Volumes::new(gpu, is_static)?)),
+            Self::Clamped => return Ok(Box::new(ByVolumes::new(gpu, 1)?.clamped(true))),
             Self::Volumetric(samples) => ImageMethod::Volumetric(Volumetric { radius_mm, samples }),
             Self::Crytek => ImageMethod::Crytek(Crytek { radius_mm }),
             // 16 directions in place of 16/4, a filter of 15 pixels.
@@ -186,15 +206,17 @@ impl Row {
 #[derive(Clone, Debug)]
 pub struct SceneFound {
     /// Which.
-    pub scene: &'static BuiltScene,
+    pub scene: About,
     /// Its triangles, each of which has a volume.
     pub triangles: usize,
     /// Share of the pixels that show a surface.
     pub covered: f64,
     /// The rows that the device has.
     pub rows: Vec<Row>,
-    /// Eq. (31) with δ times each of [`SOUGHT`], of volumes and of Volumetric AO with 1024 lines.
-    pub fits: [[f64; SOUGHT.len()]; 2],
+    /// Eq. (31) with δ times each of [`SOUGHT`], of volumes and of Volumetric AO with 1024 lines; where it was sought.
+    pub fits: Option<[[f64; SOUGHT.len()]; 2]>,
+    /// How many volumes each pixel lies in; and with clamped corners.
+    pub overdraw: [Overdraw; 2],
     /// Accessibility by [`SHOWN`].
     pub pictures: Vec<Picture>,
     /// What has no row, and why.
@@ -224,11 +246,12 @@ impl SceneFound {
     }
 
     /// The best of [`SOUGHT`] for volumes and for Volumetric AO, and the error with it.
-    pub fn best(&self) -> [(f32, f64); 2] {
-        self.fits.map(|errors| {
+    pub fn best(&self) -> Option<[(f32, f64); 2]> {
+        let best = |errors: [f64; SOUGHT.len()]| {
             let all = SOUGHT.into_iter().zip(errors);
             all.min_by(|a, b| a.1.total_cmp(&b.1)).expect("some are sought")
-        })
+        };
+        self.fits.map(|fits| fits.map(best))
     }
 }
 
@@ -245,11 +268,16 @@ pub struct Found {
     pub plan: Plan,
 }
 
-/// Measures all scenes. `progress` hears what is being done and the share of the whole that is done.
+/// Measures the seven scenes, and more. `progress` hears what is being done and the share of the whole that is done.
 ///
 /// # Errors
 /// Those of the device.
-pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> Result<Found> {
+pub fn measure(
+    gpu: &Gpu,
+    plan: &Plan,
+    more: Vec<MeshScene>,
+    progress: &mut dyn FnMut(&str, f64),
+) -> Result<Found> {
     // Pipelines last while somebody has them: compiled once for all scenes.
     let mut held: Vec<Box<dyn PixelAmbient>> = Vec::new();
     for of in [Of::Rays(1), Of::Gathered(3), Of::Crytek] {
@@ -257,11 +285,13 @@ pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> R
     }
     let drawn = Volumes::new(gpu, true);
     let mut scenes = Vec::new();
-    for (n, scene) in SCENES.iter().enumerate() {
+    let count = (SCENES.len() + more.len()) as f64;
+    let built = SCENES.iter().map(|scene| MeshScene::built(scene, plan.detail.unwrap_or(scene.detail)));
+    for (n, scene) in built.chain(more).enumerate() {
+        let name = scene.about.name.clone();
         let stand = Stand::new(gpu, scene, plan)?;
         scenes.push(stand.measure(&mut |what, share| {
-            let share = (n as f64 + share) / SCENES.len() as f64;
-            progress(&format!("{}: {what}", scene.name), share);
+            progress(&format!("{name}: {what}"), (n as f64 + share) / count);
         })?);
     }
     drop((held, drawn));
@@ -277,7 +307,7 @@ pub fn measure(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(&str, f64)) -> R
 /// A scene on the device, seen once, and twice.
 struct Stand<'a> {
     gpu: &'a Gpu,
-    scene: &'static BuiltScene,
+    scene: About,
     plan: &'a Plan,
     triangles: usize,
     surfaces: Surfaces,
@@ -295,20 +325,15 @@ struct Seen {
 
 impl Seen {
     fn new(gpu: &Gpu, surfaces: &Surfaces, size: [u32; 2], views: &[View]) -> Result<Self> {
-        let geometry = Geometry::new(gpu, size, views.len())?;
-        let pixels = geometry.pixels.bytes() / Geometry::BYTES;
-        let hits = gpu.buffer("hits", Gbuffer::HIT * pixels, BufferUse::Device)?;
-        let mut rec = gpu.recorder("geometry of meshes")?;
-        geometry.record_eyes(&mut rec, views)?;
-        Gbuffer::new(gpu)?.record(&mut rec, surfaces, &geometry, &hits)?;
-        rec.submit_and_wait()?;
+        let geometry = shown(gpu, surfaces, size, views)?;
         Ok(Self { accessibility: geometry.values(gpu, "accessibility")?, geometry })
     }
 }
 
 impl<'a> Stand<'a> {
-    fn new(gpu: &'a Gpu, scene: &'static BuiltScene, plan: &'a Plan) -> Result<Self> {
-        let world = World::new(&(scene.make)(plan.detail.unwrap_or(scene.detail)))?;
+    fn new(gpu: &'a Gpu, scene: MeshScene, plan: &'a Plan) -> Result<Self> {
+        let MeshScene { about: scene, instances } = scene;
+        let world = World::new(&instances)?;
         let surfaces = Surfaces::new(gpu, &world)?;
         let size = plan.size;
         let [left, _] = scene.eye.views(size[0] as f32 / size[1] as f32, 1.0, 1e5)?;
@@ -364,11 +389,12 @@ impl<'a> Stand<'a> {
 
     fn measure(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<SceneFound> {
         let mut found = SceneFound {
-            scene: self.scene,
+            scene: self.scene.clone(),
             triangles: self.triangles,
             covered: self.shown.iter().filter(|shown| **shown).count() as f64 / self.shown.len() as f64,
             rows: Vec::new(),
-            fits: [[0.0; SOUGHT.len()]; 2],
+            fits: None,
+            overdraw: [self.overdraw(false)?, self.overdraw(true)?],
             pictures: Vec::new(),
             left_out: Vec::new(),
         };
@@ -394,13 +420,26 @@ impl<'a> Stand<'a> {
                 Err(other) => return Err(other),
             }
         }
-        for (fits, of) in found.fits.iter_mut().zip([Of::Gathered(1), Of::Volumetric(1024)]) {
-            for (error, factor) in fits.iter_mut().zip(SOUGHT) {
-                progress(&format!("{}, δ × {factor}", name(of)), 0.75);
-                *error = self.error(&self.run(of, factor, 1)?.0, &truth);
+        if self.plan.sought {
+            let fits = found.fits.insert([[0.0; SOUGHT.len()]; 2]);
+            for (fits, of) in fits.iter_mut().zip([Of::Gathered(1), Of::Volumetric(1024)]) {
+                for (error, factor) in fits.iter_mut().zip(SOUGHT) {
+                    progress(&format!("{}, δ × {factor}", name(of)), 0.75);
+                    *error = self.error(&self.run(of, factor, 1)?.0, &truth);
+                }
             }
         }
         Ok(found)
+    }
+
+    /// How many volumes each pixel of the view lies in.
+    fn overdraw(&self, clamped: bool) -> Result<Overdraw> {
+        let delta_mm = FACTORS[0] * self.scene.delta_mm;
+        let volumes = self.surfaces.volumes(self.gpu, delta_mm, clamped)?;
+        let (geometry, surfaces) = (&self.once.geometry, &self.surfaces);
+        let on = Scene { geometry, surfaces, volumes: &volumes, delta_mm };
+        let [width, height] = self.plan.size;
+        Ok(Overdraw { width, height, counts: Counter::new(self.gpu)?.read(self.gpu, on)? })
     }
 
     fn picture(&self, values: &[f32]) -> Picture {
@@ -419,8 +458,8 @@ fn eight_bits(values: &[f32]) -> Vec<u8> {
 pub struct Verdict {
     /// What is claimed.
     pub claim: &'static str,
-    /// Scenes of ours in which it holds.
-    pub holds: Vec<&'static str>,
+    /// Scenes of ours, of the seven, in which it holds.
+    pub holds: Vec<String>,
     /// In how many of the seven the printed numbers have it.
     pub printed: usize,
 }
@@ -436,7 +475,12 @@ impl Verdict {
 }
 
 impl Found {
-    /// The printed order, claim by claim.
+    /// Scenes that stand for the paper's: all but scans.
+    pub fn built(&self) -> impl Iterator<Item = &SceneFound> {
+        self.scenes.iter().filter(|found| found.scene.is_built)
+    }
+
+    /// The printed order of the seven scenes, claim by claim.
     pub fn verdicts(&self) -> Vec<Verdict> {
         type Claim = fn(&dyn Fn(Of) -> f64) -> bool;
         /// Whether one ray errs by more than these rows.
@@ -456,7 +500,7 @@ impl Found {
                 worse_than(|of| !matches!(of, Of::Volumetric(_)), error)
             }),
             ("ray 1 is the worst of rays and AOV", |error| {
-                let rows = |of| matches!(of, Of::Rays(_) | Of::Gathered(_) | Of::Drawn { .. });
+                let rows = |of| matches!(of, Of::Rays(_) | Of::Gathered(_) | Of::Drawn { .. } | Of::Clamped);
                 worse_than(rows, error)
             }),
             ("Volumetric levels off: 1024 no better than .8 of 256", |error| {
@@ -466,10 +510,9 @@ impl Found {
         let verdict = |(claim, holds): (&'static str, Claim)| Verdict {
             claim,
             holds: self
-                .scenes
-                .iter()
+                .built()
                 .filter(|found| holds(&|of| found.error(of)))
-                .map(|found| found.scene.name)
+                .map(|found| found.scene.name.clone())
                 .collect(),
             printed: FIGURE_9
                 .iter()

@@ -1,46 +1,15 @@
 //! What [`super::meshes`] found as a page that stands alone, drawings and comma-separated values, the printed numbers (AOV Fig. 9) beside ours.
 
 use super::meshes::{ENOUGH, FACTORS, Found, Of, PRINTED_RAYS, ROWS, Row, SOUGHT, SceneFound};
+use super::meshes_panel::{draw, figure_10};
 use super::meshes_printed::{FIGURE_9, Printed};
 use super::montage::{above, beside};
 use super::report::{figures, head, inline, page, section};
 use super::tables::table;
 use crate::Result;
-use crate::plot::{Anchor, Axis, Drawing, INK, Marker, Panel, short};
+use crate::plot::short;
 use cao_formats::Picture;
 use std::fmt::Write as _;
-
-/// Size and places of the two panels of Fig. 10.
-const SHEET: [f64; 2] = [1080.0, 430.0];
-const FRAME: [f64; 2] = [410.0, 300.0];
-const LEFTS: [f64; 2] = [80.0, 590.0];
-
-/// A line of Fig. 10: its name, colour, marker, rows.
-type Line = (&'static str, &'static str, Marker, &'static [Of]);
-
-const LINES: [Line; 6] = [
-    ("rays", "#222222", Marker::Circle, &[Of::Rays(1), Of::Rays(292), Of::Rays(1941)]),
-    (
-        "AOV",
-        "#b2182b",
-        Marker::Square,
-        &[Of::Gathered(15), Of::Gathered(5), Of::Gathered(3), Of::Gathered(1)],
-    ),
-    (
-        "AOV, drawn",
-        "#ef8a62",
-        Marker::Triangle,
-        &[Of::Drawn { is_static: true }, Of::Drawn { is_static: false }],
-    ),
-    (
-        "Volumetric",
-        "#2166ac",
-        Marker::Diamond,
-        &[Of::Volumetric(1), Of::Volumetric(32), Of::Volumetric(256), Of::Volumetric(1024)],
-    ),
-    ("Crytek", "#1b7837", Marker::Hexagon, &[Of::Crytek]),
-    ("HBAO", "#762a83", Marker::Down, &[Of::Hbao]),
-];
 
 /// An error as the paper has it.
 fn variance(error: f64) -> String {
@@ -89,6 +58,16 @@ impl Found {
         lines
     }
 
+    /// The same in a line, where they are one panel of several.
+    pub(super) fn in_the_chart(&self) -> String {
+        let [width, height] = self.plan.size;
+        format!(
+            "Meshes: occlusion of the pixels of {} built-in scenes, {width} x {height}, against {} rays a pixel; error by AOV eq. (31), the mean over the scenes, of times the geometric mean.",
+            self.built().count(),
+            self.plan.rays
+        )
+    }
+
     /// Something of each scene in a line.
     fn each(&self, of: impl Fn(&SceneFound) -> String) -> String {
         let all: Vec<String> =
@@ -107,7 +86,7 @@ impl Found {
                     if verdict.reached() { "ok" } else { "FAILED" },
                     verdict.claim,
                     verdict.holds.len(),
-                    self.scenes.len(),
+                    self.built().count(),
                     verdict.holds.join(", "),
                     verdict.printed,
                     FIGURE_9.len()
@@ -118,10 +97,21 @@ impl Found {
             "dynamic volumes over static ones, drawn (printed: about 1.25): {}",
             self.each(|found| format!("{:.2}", found.dynamic()))
         ));
+        lines.push(format!(
+            "time of AOV with corners clamped at 2 δ over that without: {}",
+            self.each(|found| format!("{:.2}", found.ratio(Of::Clamped)))
+        ));
+        lines.push(format!(
+            "volumes that a pixel lies in, the mean and the most: {}",
+            self.each(|found| format!("{} ({})", short(found.overdraw[0].mean()), found.overdraw[0].most()))
+        ));
+        if self.scenes.iter().any(|found| found.fits.is_none()) {
+            return lines;
+        }
         let fit = |n: usize| {
             self.each(|found| {
-                let (factor, error) = found.best()[n];
-                format!("{factor} ({})", variance(error))
+                let best = found.best().map(|best| best[n]);
+                best.map_or_else(none, |(factor, error)| format!("{factor} ({})", variance(error)))
             })
         };
         lines.push(format!(
@@ -137,7 +127,7 @@ impl Found {
     fn errors(&self) -> String {
         let mut heads: Vec<String> = vec![String::new()];
         for found in &self.scenes {
-            let printed = Printed::of(found.scene.name)
+            let printed = Printed::of(&found.scene.name)
                 .map_or(String::new(), |printed| format!(" ({}, {})", printed.theirs, printed.triangles));
             heads.push(format!("{}, {}{printed}", found.scene.name, found.triangles));
         }
@@ -148,7 +138,7 @@ impl Found {
                 let mut row = vec![of.name(self.plan.rays)];
                 row.extend(self.scenes.iter().map(|found| {
                     let ours = found.row(of).map_or(none(), |row| variance(row.error));
-                    let printed = of.printed(found.scene.name);
+                    let printed = of.printed(&found.scene.name);
                     ours + &printed.map_or(String::new(), |[_, error]| format!(" ({})", variance(error)))
                 }));
                 row
@@ -159,7 +149,7 @@ impl Found {
 
     /// The rest of Fig. 9 of a scene.
     fn scene(&self, found: &SceneFound) -> String {
-        let name = found.scene.name;
+        let name = &found.scene.name;
         let printed_aov = Of::Gathered(1).printed(name);
         let row = |row: &Row| {
             let printed = row.of.printed(name);
@@ -191,7 +181,8 @@ impl Found {
             .scenes
             .iter()
             .flat_map(|found| {
-                ["AOV, 1", "Volumetric, 1024"].into_iter().zip(found.fits).map(|(name, errors)| {
+                let fits = found.fits.into_iter().flatten();
+                ["AOV, 1", "Volumetric, 1024"].into_iter().zip(fits).map(|(name, errors)| {
                     let mut row = vec![format!("{}: {name}", found.scene.name)];
                     row.extend(errors.map(variance));
                     row
@@ -201,35 +192,9 @@ impl Found {
         table(&head, 1, &rows)
     }
 
-    /// Fig. 10: time against error of the first scene, ours and as printed.
-    pub fn figure_10(&self) -> Drawing {
-        let mut drawing = Drawing::new(SHEET[0], SHEET[1]);
-        let Some(found) = self.scenes.first() else { return drawing };
-        let name = found.scene.name;
-        let theirs = Printed::of(name).map_or("", |printed| printed.theirs);
-        // Times of a software driver are no times of anything else.
-        let over = |ms: f64| if self.software { ms } else { 1.0 };
-        let label = if self.software { "time / that of AOV at every pixel" } else { "ms" };
-        let aov = found.row(Of::Gathered(1)).map_or(f64::NAN, Row::median);
-        let ours = |of: Of| found.row(of).map(|row| [row.median() / over(aov), row.error]);
-        let printed_aov = Of::Gathered(1).printed(name).map_or(f64::NAN, |[ms, _]| ms);
-        let printed = |of: Of| match of {
-            Of::Drawn { .. } => None,
-            of => of.printed(name).map(|[ms, error]| [ms / over(printed_aov), error]),
-        };
-        let titles = [
-            format!("{name}, {} × {}", self.plan.size[0], self.plan.size[1]),
-            format!("{theirs}, as printed"),
-        ];
-        panel(&mut drawing, LEFTS[0], [&titles[0], label], &ours);
-        panel(&mut drawing, LEFTS[1], [&titles[1], label], &printed);
-        let mut x = LEFTS[0];
-        for (name, colour, marker, _) in LINES {
-            drawing.marker(marker, [x, SHEET[1] - 22.0], 4.0, colour, false);
-            drawing.text([x + 10.0, SHEET[1] - 18.0], name, 12, Anchor::Start, INK, false);
-            x += 130.0;
-        }
-        drawing
+    fn scene_names(&self) -> String {
+        let names: Vec<&str> = self.scenes.iter().map(|found| found.scene.name.as_str()).collect();
+        names.join(", ")
     }
 
     /// Fig. 11: accessibility, a scene a row: reference, AOV, Volumetric, Crytek.
@@ -252,15 +217,15 @@ impl Found {
         body += "</ul>\n";
         body += &section(
             "Fig. 9: errors",
-            "Eq. (31); in brackets the printed ones, of the scene that each of ours stands for. The models are not the paper's: orders can be compared, numbers only in size. Each triangle \
-             has a volume; how often they overlap on the screen, as Fig. 5 shows it, is not counted.",
+            "Eq. (31); in brackets the printed ones, of the scene that each of ours stands for. The models are not the paper's: orders can be compared, numbers only in size. \
+             Scans stand for none of them, and count for no claim.",
         );
         body += &self.errors();
         for found in &self.scenes {
             body += &section(
                 &format!("Fig. 9: {}", found.scene.title),
                 &format!(
-                    "{}. {} triangles, a surface in {:.0} % of the pixels, δ = {} mm. Printed times: a GeForce 280 GT, its volumes drawn and static; of rays eight cores.",
+                    "{}. {} triangles, each of which has a volume, a surface in {:.0} % of the pixels, δ = {} mm. Printed times: a GeForce 280 GT, its volumes drawn and static; of rays eight cores.",
                     found.scene.what,
                     found.triangles,
                     100.0 * found.covered,
@@ -276,15 +241,29 @@ impl Found {
         body += &self.fits();
         body += &section(
             "Fig. 10: time against error",
-            "Nearer to the lower left is better. Dashed: the error of Crytek, whose number of samples does not change. Of the other scenes meshes.csv has the numbers.",
+            "Nearer to the lower left is better. Dashed: the error of Crytek, whose number of samples does not change.",
         );
-        body += &inline(&self.figure_10());
+        body += &inline(&figure_10(self));
+        body += &section(
+            "Time against error, scene by scene",
+            "As Fig. 10, on the same axes; first over the built-in scenes: geometric means of times, means of errors.",
+        );
+        body += &inline(&draw(self));
+        body += &section(
+            "Fig. 5: how many volumes a pixel lies in",
+            "What drawing volumes costs, and gathering them too: those with a falloff above 0 where the pixel's surface is.",
+        );
+        body += &self.overdraws();
+        body += &inline(&self.overdraw_scale());
+        let rows = self.scene_names();
+        let shows = format!(
+            "volumes that a pixel lies in, and 1 − AO by AOV at every pixel, Volumetric with 1024 lines, Crytek; from above {rows}"
+        );
+        body += &figures([(5, shows.as_str(), &self.figure_5())], "width: 100%; image-rendering: pixelated")?;
         body += &section("Fig. 11: accessibility", "");
         let picture = self.figure_11();
-        let names: Vec<&str> = self.scenes.iter().map(|found| found.scene.name).collect();
         let shows = format!(
-            "1 − AO by rays, AOV at every pixel, Volumetric with 1024 lines, Crytek; from above {}",
-            names.join(", ")
+            "1 − AO by rays, AOV at every pixel, Volumetric with 1024 lines, Crytek; from above {rows}"
         );
         body += &figures([(11, shows.as_str(), &picture)], "width: 100%; image-rendering: pixelated")?;
         Ok(page("cao chart --meshes", &body))
@@ -293,20 +272,22 @@ impl Found {
     /// Every row of every scene, its first line the names of the columns; a line for each timed run.
     pub fn runs(&self) -> String {
         let mut text = String::from(
-            "scene,triangles,delta_mm,width,height,reference_rays,method,factor,printed_ms,printed_error,error,rmse,run,ms,over_aov\r\n",
+            "scene,triangles,volumes_mean,volumes_most,delta_mm,width,height,reference_rays,method,factor,printed_ms,printed_error,error,rmse,run,ms,over_aov\r\n",
         );
         let [width, height] = self.plan.size;
         for found in &self.scenes {
             let aov = found.row(Of::Gathered(1)).map_or(f64::NAN, Row::median);
             for row in &found.rows {
-                let printed = row.of.printed(found.scene.name);
+                let printed = row.of.printed(&found.scene.name);
                 let printed = printed.map_or(",".to_owned(), |[ms, error]| format!("{ms},{error}"));
                 for (n, ms) in row.ms.iter().enumerate() {
                     let _ = write!(
                         text,
-                        "{},{},{},{width},{height},{},\"{}\",{},{printed},{},{},{},{ms},{}\r\n",
+                        "{},{},{},{},{},{width},{height},{},\"{}\",{},{printed},{},{},{},{ms},{}\r\n",
                         found.scene.name,
                         found.triangles,
+                        found.overdraw[usize::from(row.of == Of::Clamped)].mean(),
+                        found.overdraw[usize::from(row.of == Of::Clamped)].most(),
                         found.scene.delta_mm,
                         self.plan.rays,
                         row.of.name(self.plan.rays),
@@ -327,7 +308,8 @@ impl Found {
         let mut text = String::from("scene,method,factor,error,printed_factor\r\n");
         for found in &self.scenes {
             let of = [Of::Gathered(1), Of::Volumetric(1024)];
-            for ((of, errors), printed) in of.into_iter().zip(found.fits).zip(FACTORS) {
+            let fits = found.fits.into_iter().flatten();
+            for ((of, errors), printed) in of.into_iter().zip(fits).zip(FACTORS) {
                 for (factor, error) in SOUGHT.into_iter().zip(errors) {
                     let name = of.name(self.plan.rays);
                     let _ = write!(text, "{},\"{name}\",{factor},{error},{printed}\r\n", found.scene.name);
@@ -346,41 +328,12 @@ impl Found {
                 "\"{}\",{},{},{},{},\"{}\"\r\n",
                 verdict.claim,
                 verdict.holds.len(),
-                self.scenes.len(),
+                self.built().count(),
                 verdict.printed,
                 verdict.reached(),
                 verdict.holds.join(" ")
             );
         }
         text
-    }
-}
-
-/// Time against error: a line of each method.
-fn panel(
-    drawing: &mut Drawing,
-    left: f64,
-    [title, label]: [&str; 2],
-    value: &dyn Fn(Of) -> Option<[f64; 2]>,
-) {
-    let every: Vec<[f64; 2]> =
-        LINES.iter().flat_map(|(.., rows)| rows.iter().filter_map(|of| value(*of))).collect();
-    let panel = Panel {
-        at: [left, 40.0],
-        size: FRAME,
-        x: Axis::log(label, every.iter().map(|[ms, _]| *ms)),
-        y: Axis::log("error, AOV eq. (31)", every.iter().map(|[_, error]| *error)),
-    };
-    panel.draw(drawing, title);
-    for (_, colour, marker, rows) in LINES {
-        let points: Vec<[f64; 2]> =
-            rows.iter().filter_map(|of| value(*of)).map(|[ms, error]| panel.place(ms, error)).collect();
-        drawing.polyline(&points, colour, 1.5, false);
-        if let (&[Of::Crytek], [[_, y]]) = (rows, &points[..]) {
-            drawing.polyline(&[[left, *y], [left + FRAME[0], *y]], colour, 1.0, true);
-        }
-        for point in points {
-            drawing.marker(marker, point, 4.0, colour, false);
-        }
     }
 }

@@ -85,6 +85,8 @@ impl Printed {
             Of::Rays(part) => [PRINTED_RAYS, 1941, 292, 1].iter().position(|rays| *rays == part),
             Of::Gathered(step) => [1, 3, 5, 15].iter().position(|own| *own == step).map(|n| 4 + n),
             Of::Drawn { is_static } => is_static.then_some(4),
+            // Theirs are clamped.
+            Of::Clamped => Some(4),
             Of::Volumetric(samples) => {
                 [1024, 256, 32, 1].iter().position(|own| *own == samples).map(|n| 8 + n)
             }

@@ -5,6 +5,7 @@
 //! so that what else the machine does touches all of them alike. Quoted are medians, with quartiles as spread; on a software
 //! driver as ratios to the baseline of the same run.
 
+mod caption;
 pub mod csv;
 pub mod deep;
 mod deep_page;
@@ -15,8 +16,11 @@ pub mod front;
 pub mod looks;
 pub mod looks_draw;
 pub mod meshes;
+mod meshes_overdraw;
 mod meshes_page;
+pub mod meshes_panel;
 pub mod meshes_printed;
+pub mod meshes_scenes;
 mod montage;
 pub mod paper;
 pub mod peers;
@@ -142,6 +146,8 @@ pub struct Chart {
     pub plan: Plan,
     /// Each scene.
     pub scenes: Vec<SceneChart>,
+    /// Surfaces, whose panel is their own; not measured by [`measure`].
+    pub meshes: Option<meshes::Found>,
 }
 
 /// One scene's part.
@@ -349,6 +355,7 @@ pub fn measure(
         software: info.kind == DeviceKind::Cpu,
         plan: *plan,
         scenes: measured,
+        meshes: None,
     })
 }
 
@@ -765,48 +772,6 @@ impl Known {
             ssim_3d: ssim,
             runs: Vec::new(),
         }
-    }
-}
-
-impl Chart {
-    /// Whether a point's contender is the one that stands for its method in tables and pictures.
-    fn featured(&self, point: &Point) -> bool {
-        let mut shown = self.scenes.iter().flat_map(|scene| &scene.pictures);
-        shown.any(|shown| shown.method == point.method && shown.setting == point.setting)
-    }
-
-    /// What one has to know to read the chart, line by line.
-    pub fn caption(&self) -> Vec<String> {
-        let mut lines = vec![format!("{}, {}.", self.device, self.driver)];
-        for scene in &self.scenes {
-            let [x, y, z] = scene.dims;
-            let Some((_, truth)) = scene.references.first() else { continue };
-            lines.push(format!(
-                "{}: {x} x {y} x {z} voxels, radius {} mm, clip {}; errors at {} of {} voxels that show, or at {} points of the surface.",
-                scene.name, scene.radius_mm, scene.clips, truth.computed, truth.counting, truth.surface
-            ));
-        }
-        for scene in &self.scenes {
-            lines.extend(scene.left_out.iter().map(|out| format!("{}: {out}", scene.name)));
-        }
-        let worst = self.scenes.iter().flat_map(|s| &s.references).map(|(_, t)| t.convergence);
-        let reference = self.plan.reference;
-        lines.push(format!(
-            "Reference: {} directions, {} steps a voxel; doubling both moves it by {:.5} RMS at most. Medians of {} runs in one process, methods alternating; whiskers: quartiles.",
-            reference.directions,
-            reference.steps_per_voxel,
-            worst.fold(0.0, f64::max),
-            self.plan.runs
-        ));
-        lines.push(format!(
-            "Changes: clip moved by {CLIP_VOXELS} voxel along each axis, opacities and radius times {OPACITY_FACTOR} and {RADIUS_FACTOR}, or all values new, and back again. Copying a new volume to the device is not counted."
-        ));
-        lines.push(format!(
-            "Image space has values on the surface in the image only, {} x {} pixels an eye: its errors are at those points, against the reference there, and it",
-            self.plan.size[0], self.plan.size[1]
-        ));
-        lines.push("competes for no front; its values are halved, for it shades half a sphere. It has to be done again whenever the head moves.".into());
-        lines
     }
 }
 

@@ -253,6 +253,7 @@ pub fn measure(
             reference: reference::Plan::QUICK,
         },
         scenes: charts,
+        meshes: None,
     };
     Ok(Paper { chart, shares, figures, plan: *plan })
 }

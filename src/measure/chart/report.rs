@@ -2,6 +2,7 @@
 
 use super::draw;
 use super::looks_draw;
+use super::meshes_panel;
 use super::peers::Peers;
 use super::pictures::{SATURATED, Shown};
 use super::tables::{self, escaped};
@@ -50,6 +51,13 @@ pub fn html(chart: &Chart, machine: &str, command: &str, peers: Option<&Peers>) 
     );
     body += &inline(&looks_draw::draw(chart));
     body += &tables::pictures(chart);
+    if let Some(found) = &chart.meshes {
+        body += &section(
+            "Meshes: time against error",
+            "Ambient occlusion of pixels: volumes, rays and methods of image space on built-in scenes of meshes. cao chart --meshes has the tables and figures of their paper.",
+        );
+        body += &inline(&meshes_panel::draw(found));
+    }
     body += &section(
         "What can change in real time",
         "Table 1 of the paper has ticks; ours has times, at one setting of each method.",

@@ -1,4 +1,5 @@
 //! Host sides of the kernels that only measurements use.
 
+pub mod overdraw;
 pub mod reference;
 pub mod ssao;

@@ -1,24 +1,23 @@
 //! Overdraw (AOV §6, measure.md §4): the farther occlusion reaches, the more volumes each pixel lies in, and the longer AOV takes.
 //!
-//! Counted is what is the same on every device: volumes that hold a place, by the twin, the mean over pixels. Times are those of the device, as multiples of each
+//! Counted is what is the same on every device: volumes that hold what a pixel shows, the mean over those of the left eye that show something. Times are those of the device, as multiples of each
 //! method's own at the smallest reach: they say how a method grows, not which is the faster. Ours gathers volumes. Control: volumes drawn, as published. Yardstick:
 //! rays, whose number does not grow.
 
 use super::{Chart, Effort, Finding, Ours, Quantity, Series, mean};
 use crate::Result;
+use crate::kernels::overdraw::Overdraw;
 use crate::plot::short;
+use crate::shown::shown;
 use cao::mesh::ambient::{ByRays, ByVolumes, PixelAmbient};
+use cao::mesh::gather::Scene;
+use cao::mesh::surfaces::Surfaces;
 use cao::mesh::volumes::Volumes;
 use cao::mesh_renderer::MeshRenderer;
 use cao_gpu::{Gpu, Phase};
 use cao_model::look::Look;
 use cao_model::scenes::BuiltScene;
-use cao_model::surface::{Triangle, World};
-use cao_model::view::View;
-use cao_twin::each;
-use cao_twin::mesh::gbuffer::gbuffer;
-use cao_twin::mesh::occluder::contribution;
-use glam::DVec3;
+use cao_model::surface::World;
 
 /// Sizes and values of the trial.
 #[derive(Clone, Debug)]
@@ -31,8 +30,6 @@ pub struct Plan {
     pub reaches: Vec<f32>,
     /// Pixels of a picture.
     pub size: [u32; 2],
-    /// Pixels at which volumes are counted.
-    pub counted: [u32; 2],
     /// Pictures of which the fastest counts.
     pub runs: usize,
 }
@@ -42,17 +39,10 @@ impl Plan {
     pub fn of(effort: Effort) -> Self {
         let scene = "relief";
         match effort {
-            Effort::Full => Self {
-                scene,
-                detail: 1,
-                reaches: vec![0.25, 0.5, 1.0, 2.0, 4.0],
-                size: [128, 72],
-                counted: [32, 18],
-                runs: 3,
-            },
-            Effort::Quick => {
-                Self { scene, detail: 1, reaches: vec![0.5, 2.0], size: [64, 36], counted: [16, 9], runs: 1 }
+            Effort::Full => {
+                Self { scene, detail: 1, reaches: vec![0.25, 0.5, 1.0, 2.0, 4.0], size: [128, 72], runs: 3 }
             }
+            Effort::Quick => Self { scene, detail: 1, reaches: vec![0.5, 2.0], size: [64, 36], runs: 1 },
         }
     }
 }
@@ -60,36 +50,22 @@ impl Plan {
 /// Rays a pixel.
 const RAYS: u32 = 16;
 
-/// Whether a place lies in a triangle's volume, on either side of one that has two.
-fn holds(triangle: &Triangle, two_sided: bool, place: DVec3, delta: f64) -> bool {
-    let [a, b, c] = triangle.corners.map(|corner| corner.as_dvec3());
-    let face = (b - a).cross(c - a).normalize();
-    // A surface there that is turned to the triangle's plane sees all of it, so that its occlusion is 0 where its falloff is and nowhere else.
-    let towards = if face.dot(a - place) > 0.0 { face } else { -face };
-    contribution(triangle, two_sided, place, towards, delta) > 0.0
-}
-
-/// Volumes that a pixel's place lies in, the mean over the pixels that show something.
-fn volumes(world: &World, view: &View, counted: [u32; 2], delta: f64) -> f64 {
-    let shown: Vec<_> = gbuffer(world, &[], view, counted).into_iter().flatten().collect();
-    let counts = each(shown.len(), |n| {
-        let two_sided = |triangle: &Triangle| world.materials[triangle.material as usize].two_sided;
-        let held = |triangle: &&Triangle| holds(triangle, two_sided(triangle), shown[n].place, delta);
-        world.triangles.iter().filter(held).count() as f64
-    });
-    mean(&counts)
-}
-
 /// Runs the trial, telling the share done. Uses the device's queue and waits for it.
 pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Finding> {
     let scene = BuiltScene::parse(plan.scene)?;
     let world = World::new(&(scene.make)(plan.detail))?;
     let views = scene.eye.views(plan.size[0] as f32 / plan.size[1] as f32, 1.0, 1e5)?;
+    let surfaces = Surfaces::new(gpu, &world)?;
+    let geometry = shown(gpu, &surfaces, plan.size, &views[..1])?;
+    let overdraw = Overdraw::new(gpu)?;
     let mut counts = Vec::new();
     let mut times: [Vec<[f64; 2]>; 3] = Default::default();
     for (n, &reach) in plan.reaches.iter().enumerate() {
         let delta = reach * scene.delta_mm;
-        counts.push([f64::from(reach), volumes(&world, &views[0], plan.counted, f64::from(delta))]);
+        let volumes = surfaces.volumes(gpu, delta, false)?;
+        let on = Scene { geometry: &geometry, surfaces: &surfaces, volumes: &volumes, delta_mm: delta };
+        let held: Vec<f64> = overdraw.read(gpu, on)?.into_iter().flatten().map(f64::from).collect();
+        counts.push([f64::from(reach), mean(&held)]);
         // A device that does not blend floats of 32 bits draws none.
         let drawn = Volumes::new(gpu, true).ok();
         let methods: [Option<Box<dyn PixelAmbient>>; 3] = [
@@ -157,13 +133,11 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         ours: if bound { Ours::Limited } else { Ours::Holds },
         control_fails: bound,
         setting: format!(
-            "{} of {} triangles, {}×{} pixels an eye, volumes counted at {}×{} pixels; the fastest of {} pictures",
+            "{} of {} triangles, {}×{} pixels an eye; the fastest of {} pictures",
             scene.name,
             world.triangles.len(),
             plan.size[0],
             plan.size[1],
-            plan.counted[0],
-            plan.counted[1],
             plan.runs
         ),
         charts,

@@ -1,4 +1,5 @@
 //! What methods are measured against.
 
+pub mod overdraw;
 pub mod reference;
 pub mod ssao;

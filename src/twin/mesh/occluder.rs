@@ -4,7 +4,7 @@
 //! with the sign of polygons that face the point, and without the acos that loses small angles.
 
 use cao_model::surface::Triangle;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
 /// A polygon's part above the plane through the origin across `normal`.
@@ -35,14 +35,39 @@ pub fn occlusion(polygon: &[DVec3], normal: DVec3) -> f64 {
     (-(0..above.len()).map(term).sum::<f64>() / TAU).max(0.0)
 }
 
+/// How far volumes reach.
+#[derive(Clone, Copy, Debug)]
+pub struct Volume {
+    /// δ in mm.
+    pub delta: f64,
+    /// Whether their corners are clamped (§5.2), so that none is cut by a box.
+    pub clamped: bool,
+}
+
+/// The length that extension vectors are clamped to, in δ (§5.2).
+const CLAMP: f64 = 2.0;
+
 /// Corners that stick out of a volume farther than this, in δ, make it a sliver's, which ends with the box of its triangle.
 const MOST_MITRE: f64 = 4.0;
 
 /// What lies in front of a face by less than this, in mm, is the face itself: places come from rays in f32.
 const NOTHING: f64 = 1e-3;
 
+/// Whether the origin is over the base of a clamped volume: extension vectors by eq. 28.
+fn in_clamped(corners: [DVec3; 3], inward: [DVec3; 3], face: DVec3, delta: f64) -> bool {
+    let base = [0, 1, 2].map(|i| {
+        let planes = DMat3::from_cols(inward[i], inward[(i + 2) % 3], -face).transpose();
+        let extension = planes.inverse() * DVec3::new(-delta, -delta, 0.0);
+        corners[i] + extension.clamp_length_max(CLAMP * delta)
+    });
+    (0..3).all(|i| {
+        let (from, to) = (base[i], base[(i + 1) % 3]);
+        from.dot(face.cross(to - from)) <= 0.0
+    })
+}
+
 /// g of eq. 24, without ᾱ, of a triangle that faces the origin: the product with the distance from the face, which the printed one ends before.
-fn falloff(corners: [DVec3; 3], delta: f64) -> f64 {
+fn falloff(corners: [DVec3; 3], Volume { delta, clamped }: Volume) -> f64 {
     let [a, b, c] = corners;
     let face = (b - a).cross(c - a).normalize();
     let height = -a.dot(face);
@@ -51,8 +76,11 @@ fn falloff(corners: [DVec3; 3], delta: f64) -> f64 {
     }
     let edges = [(a, b), (b, c), (c, a)];
     let inward = edges.map(|(from, to)| face.cross((to - from).normalize()));
+    if clamped && !in_clamped(corners, inward, face, delta) {
+        return 0.0;
+    }
     let sharp = |i: usize| 1.0 / (0.5 * (1.0 + inward[i].dot(inward[(i + 2) % 3]))).sqrt();
-    if (0..3).any(|i| sharp(i) > MOST_MITRE) {
+    if !clamped && (0..3).any(|i| sharp(i) > MOST_MITRE) {
         let longest = |x: DVec3, y: DVec3| if y.length() > x.length() { y } else { x };
         let along = edges.map(|(from, to)| to - from).into_iter().fold(DVec3::ZERO, longest).normalize();
         for axis in [along, face.cross(along)] {
@@ -69,15 +97,31 @@ fn falloff(corners: [DVec3; 3], delta: f64) -> f64 {
     near * (1.0 - height / delta)
 }
 
-/// What a triangle contributes to the occlusion of a place: ᾱ times falloff times exact occlusion; of one with two sides the one that faces it.
-pub fn contribution(triangle: &Triangle, two_sided: bool, place: DVec3, normal: DVec3, delta: f64) -> f64 {
+/// A triangle's faces as a place sees them, relative to it, and g of eq. 24, the product with ᾱ: of one with two sides one faces it, whose g is the other's 0.
+fn faces(triangle: &Triangle, two_sided: bool, place: DVec3, volume: Volume) -> [([DVec3; 3], f64); 2] {
     let [a, b, c] = triangle.corners.map(|corner| corner.as_dvec3() - place);
-    let faces = |[a, b, c]: [DVec3; 3]| {
-        let falloff = falloff([a, b, c], delta);
-        if falloff > 0.0 { falloff * occlusion(&[a, b, c], normal) } else { 0.0 }
+    let of = |corners, there: bool| {
+        let falloff = if there { falloff(corners, volume) } else { 0.0 };
+        (corners, f64::from(triangle.opacity) * falloff)
     };
-    let back = if two_sided { faces([a, c, b]) } else { 0.0 };
-    f64::from(triangle.opacity) * (faces([a, b, c]) + back)
+    [of([a, b, c], true), of([a, c, b], two_sided)]
+}
+
+/// What a triangle contributes to the occlusion of a place: ᾱ times falloff times exact occlusion; of one with two sides the one that faces it.
+pub fn contribution(
+    triangle: &Triangle,
+    two_sided: bool,
+    place: DVec3,
+    normal: DVec3,
+    volume: Volume,
+) -> f64 {
+    let of = |(corners, g): ([DVec3; 3], f64)| if g > 0.0 { g * occlusion(&corners, normal) } else { 0.0 };
+    faces(triangle, two_sided, place, volume).map(of).iter().sum()
+}
+
+/// Whether a place is in a triangle's volume: where g is above 0.
+pub fn holds(triangle: &Triangle, two_sided: bool, place: DVec3, volume: Volume) -> bool {
+    faces(triangle, two_sided, place, volume).iter().any(|(_, g)| *g > 0.0)
 }
 
 #[cfg(test)]
@@ -155,12 +199,33 @@ mod tests {
     fn falloff_goes_from_one_at_the_face_to_none_at_delta() {
         let at = |x: f64, h: f64| {
             let corners = [(-4.0, -4.0), (-4.0, 4.0), (4.0, 0.0)].map(|(a, b)| DVec3::new(a - x, b, h));
-            falloff(corners, 2.0)
+            falloff(corners, Volume { delta: 2.0, clamped: false })
         };
         near(at(0.0, 0.5), 0.75);
         near(at(0.0, 1.0), 0.5);
         // A millimetre beyond the edge x = -4: half of δ away.
         near(at(-5.0, 1.0), 0.25);
         assert_eq!((at(-6.0, 1.0), at(0.0, 2.0), at(0.0, -1.0), at(0.0, 1e-4)), (0.0, 0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn clamped_volumes_end_two_delta_from_corners_sharper_than_60_degrees() {
+        // A corner at the origin of the plane, its edges 10 long, half its angle on either side of x; the place beyond it.
+        let at = |angle: f64, beyond: f64, clamped| {
+            let (sine, cosine) = (0.5 * angle.to_radians()).sin_cos();
+            let corners = [(0.0, 0.0), (10.0 * cosine, 10.0 * sine), (10.0 * cosine, -10.0 * sine)];
+            let corners = corners.map(|(x, y)| DVec3::new(x + beyond, y, 0.5));
+            falloff(corners, Volume { delta: 1.0, clamped })
+        };
+        // How far corners reach: δ / sin of half the angle.
+        for (angle, reach) in [(90.0, std::f64::consts::SQRT_2), (60.0, 2.0), (45.0, 2.613_126)] {
+            for clamped in [false, true] {
+                let end: f64 = if clamped { reach.min(CLAMP) } else { reach };
+                let [within, beyond] = [0.999, 1.001].map(|share| at(angle, share * end, clamped));
+                assert!(within > 0.0 && beyond == 0.0, "{angle}°, clamped {clamped}: {within}, {beyond}");
+            }
+        }
+        // Where it is not cut nothing changes.
+        assert_eq!(at(45.0, 1.9, true), at(45.0, 1.9, false));
     }
 }
