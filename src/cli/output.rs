@@ -83,6 +83,14 @@ impl Out {
             n => format!(", {n} without area left out"),
         };
         self.line(format!("meshes    {triangles} triangles{left_out}, {materials} materials"));
+        self.json(json!({
+            "triangles": triangles, "degenerate_triangles": world.degenerate, "materials": materials
+        }));
+        self.pixels(occlusion, delta_mm);
+    }
+
+    /// How pixels are occluded.
+    pub fn pixels(&mut self, occlusion: &PixelOcclusion, delta_mm: f32) {
         let method = occlusion.method.name();
         let entry = occlusion.method.entry();
         let mut how = String::new();
@@ -100,7 +108,6 @@ impl Out {
         }
         self.line(format!("surfaces  {method}{how}, delta {delta_mm} mm"));
         self.json(json!({
-            "triangles": triangles, "degenerate_triangles": world.degenerate, "materials": materials,
             "mesh_method": method, "delta_mm": delta_mm, "sparse": occlusion.sparse,
             "clamp": occlusion.clamp,
         }));

@@ -14,7 +14,7 @@
 //!     spared = true                    # whether clips leave it whole; default: false
 //!     two_sided = true                 # whether backs are surfaces, too; default: as the file has it, docs/formats.md
 //!
-//!     [mesh_occlusion]
+//!     [mesh_occlusion]                 # without [[mesh]]: crytek, volumetric, hbao of what the volume's picture shows first, in place of [occlusion]
 //!     method = "aov"                   # aov rays crytek volumetric hbao
 //!     delta_mm = 60                    # how far obscurance reaches; default: a tenth of the half diagonal of all meshes
 //!     sparse = 5                       # of aov: every fifth pixel in each direction is computed; 1 3 5 15

@@ -98,7 +98,7 @@ use cao_model::look::{LightFrom, Look, Occluded, Shading};
 use cao_model::methods::Method;
 use cao_model::occlusion::{Occlusion, Quadrature, RaySet};
 use cao_model::options::Options;
-use cao_model::pixel_occlusion::PixelOcclusion;
+use cao_model::pixel_occlusion::{PixelMethod, PixelOcclusion};
 use cao_model::samples::{Filter, MOST_SAMPLES};
 use cao_model::settings::{Scope, Setup};
 use cao_model::transfer::TransferFunction;
@@ -120,8 +120,8 @@ pub struct Scene {
     pub transfer: TransferSource,
     /// Meshes that are drawn; at most [`MOST_MESHES`].
     pub meshes: Vec<MeshSource>,
-    /// How they are occluded.
-    pub mesh_occlusion: PixelOcclusion,
+    /// How they are occluded; without meshes, how what the volume's picture shows is, in place of the volume's own occlusion.
+    pub mesh_occlusion: Option<PixelOcclusion>,
     /// Clips, all applied together; at most [`Clip::MAX`]. Meshes are solids.
     pub clips: Vec<Clip>,
     /// Parts of the volume; see [`FeatureSettings::features`].
@@ -374,7 +374,7 @@ impl Scene {
             frame: Frame::default(),
             transfer: TransferSource::Preset("auto".into()),
             meshes: Vec::new(),
-            mesh_occlusion: PixelOcclusion::default(),
+            mesh_occlusion: None,
             clips: Vec::new(),
             features: FeatureSettings::default(),
             occlusion: OcclusionSettings::default(),
@@ -408,6 +408,17 @@ impl Scene {
             ));
         }
         file.check_meshes()?;
+        let mesh_occlusion = file.mesh_occlusion.map(MeshOcclusionFile::read).transpose()?;
+        if let Some(PixelOcclusion { method, .. }) = mesh_occlusion.filter(|_| file.mesh.is_empty())
+            && method.entry().world
+        {
+            let problem = format!(
+                "{}: it reads triangles, and there is no [[mesh]]; of a volume's picture expected {}",
+                method.name(),
+                PixelMethod::of_images().join(", ")
+            );
+            return Err(Error::refused("mesh_occlusion.method", problem));
+        }
         let clips = file.clip.into_iter().enumerate();
         let step_mm = file.image.step_mm.map(|mm| mm as f32);
         let (samples, filter) = file.image.samples()?;
@@ -424,9 +435,7 @@ impl Scene {
                 .transfer
                 .map_or(Ok(TransferSource::Preset("auto".into())), |t| transfer_source(t, base))?,
             meshes: meshes.map(|(i, mesh)| mesh.read(&format!("mesh[{i}]"), base)).collect::<Result<_>>()?,
-            mesh_occlusion: file
-                .mesh_occlusion
-                .map_or(Ok(PixelOcclusion::default()), MeshOcclusionFile::read)?,
+            mesh_occlusion,
             clips: clips.map(|(i, clip)| clip.read(&format!("clip[{i}]"), base)).collect::<Result<_>>()?,
             features: FeatureSettings::from_keys(file.label, file.feature, base)?,
             occlusion: file.occlusion.unwrap_or_default().read()?,
@@ -480,10 +489,13 @@ impl SceneFile {
             return Err(Error::refused("mesh", problem));
         }
         if self.mesh.is_empty() {
-            return match (&self.volume, &self.mesh_occlusion) {
-                (None, _) => Err(Error::refused("scene", "missing field `volume`; expected it, or [[mesh]]")),
-                (_, Some(_)) => Err(Error::refused("mesh_occlusion", "has no effect without [[mesh]]")),
-                (_, None) => Ok(()),
+            let problem = "has no effect beside [mesh_occlusion], which without [[mesh]] takes its place";
+            return match (&self.volume, &self.mesh_occlusion, &self.occlusion) {
+                (None, ..) => {
+                    Err(Error::refused("scene", "missing field `volume`; expected it, or [[mesh]]"))
+                }
+                (_, Some(_), Some(_)) => Err(Error::refused("occlusion", problem)),
+                _ => Ok(()),
             };
         }
         let of_volumes = [

@@ -127,6 +127,11 @@ impl PixelMethod {
         PIXEL_METHODS.iter().find(|entry| entry.method == self).expect("every method has an entry")
     }
 
+    /// Names of those that read nothing but an image.
+    pub fn of_images() -> Vec<&'static str> {
+        PIXEL_METHODS.iter().filter(|entry| !entry.world).map(|entry| entry.name).collect()
+    }
+
     /// Its name in scene files.
     pub fn name(self) -> &'static str {
         self.entry().name

@@ -16,7 +16,7 @@ fn read(text: &str) -> Result<Scene, String> {
 fn a_mesh_is_enough() {
     let scene = read("[[mesh]]\nbuiltin = \"fence\"").unwrap();
     assert!(scene.volume.is_none());
-    assert_eq!(scene.mesh_occlusion, PixelOcclusion::default());
+    assert_eq!(scene.mesh_occlusion, None);
     let [mesh] = &scene.meshes[..] else { panic!("{:?}", scene.meshes) };
     let MeshFrom::Builtin(fence, detail) = mesh.from else { panic!("{mesh:?}") };
     assert_eq!((fence.name, detail), ("fence", fence.detail));
@@ -64,13 +64,17 @@ fn every_key_of_a_mesh_is_read() {
         clamp: true,
         ..PixelOcclusion::of(PixelMethod::Aov)
     };
-    assert_eq!(scene.mesh_occlusion, expected);
+    assert_eq!(scene.mesh_occlusion, Some(expected));
     let of = |keys: &str| {
-        read(&format!("[[mesh]]\nbuiltin = \"house\"\n[mesh_occlusion]\n{keys}")).unwrap().mesh_occlusion
+        let scene = read(&format!("[[mesh]]\nbuiltin = \"house\"\n[mesh_occlusion]\n{keys}")).unwrap();
+        scene.mesh_occlusion.unwrap()
     };
     assert_eq!(of("method = \"rays\"\nrays = 5000").rays, 5000);
     assert_eq!(of("method = \"hbao\"\nsamples = 96").samples, 96);
     assert_eq!(of("method = \"crytek\""), PixelOcclusion::of(PixelMethod::Crytek));
+    // Of what a volume's picture shows.
+    let alone = read("volume = \"builtin:engine:8\"\n[mesh_occlusion]\nmethod = \"hbao\"").unwrap();
+    assert_eq!(alone.mesh_occlusion, Some(PixelOcclusion::of(PixelMethod::Hbao)));
 }
 
 #[test]
@@ -94,7 +98,11 @@ fn what_is_wrong_with_meshes_is_refused_by_name() {
         ("[image]\nwidth = 3", "scene: missing field `volume`"),
         (
             "volume = \"builtin:engine:8\"\n[mesh_occlusion]\nsparse = 3",
-            "mesh_occlusion: has no effect without [[mesh]]",
+            "mesh_occlusion.method: aov: it reads triangles, and there is no [[mesh]]; of a volume's picture expected crytek, volumetric, hbao",
+        ),
+        (
+            "volume = \"builtin:engine:8\"\n[mesh_occlusion]\nmethod = \"hbao\"\n[occlusion]\nrays = 26",
+            "occlusion: has no effect beside [mesh_occlusion]",
         ),
         ("[[mesh]]\nscale = 2", "mesh[0]: expected either file or builtin"),
         ("[[mesh]]\nfile = \"a.obj\"\nbuiltin = \"house\"", "mesh[0]: expected either file or builtin"),

@@ -25,6 +25,32 @@ fn scenes_of_meshes_are_drawn_by_every_method() {
 }
 
 #[test]
+fn what_a_volumes_picture_shows_is_shaded_in_image_space() {
+    let folder = Folder::with_device();
+    let scene =
+        |more: &str| format!("volume = \"builtin:engine:32\"\n{more}\n[image]\nwidth = 64\nheight = 48\n");
+    let picture = |name: &str| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
+    folder.put("open.toml", scene("[shading]\nmode = \"phong\""));
+    folder.json("render open.toml -o open.png");
+    let open = picture("open.png");
+    let mut all = Vec::new();
+    for method in ["crytek", "volumetric", "hbao"] {
+        folder.put("scene.toml", scene(&format!("[mesh_occlusion]\nmethod = \"{method}\"\ndelta_mm = 6")));
+        let answer = folder.json(&format!("render scene.toml -o {method}.png"));
+        assert_eq!((&answer["mesh_method"], &answer["delta_mm"]), (&method.into(), &6.0.into()));
+        assert!(answer["stages_ms"]["image space"].as_f64().is_some_and(|ms| ms > 0.0), "{answer}");
+        let shaded = picture(&format!("{method}.png"));
+        assert!(shaded.iter().zip(&open).all(|(a, b)| a <= b), "{method}: brighter than open");
+        let darker = shaded.iter().zip(&open).filter(|(a, b)| **a + 10 < **b).count();
+        assert!(darker > 300, "{method}: {darker}");
+        all.push(shaded);
+    }
+    assert!(all[0] != all[1] && all[1] != all[2]);
+    let refused = folder.run("render scene.toml -o x.png --method rays");
+    assert!(refused.code == Some(2) && refused.err.contains("[mesh_occlusion]"), "{}", refused.err);
+}
+
+#[test]
 fn meshes_stand_in_volumes_and_are_cut_with_them() {
     let folder = Folder::with_device();
     let scene = |clip: &str| {

@@ -56,7 +56,8 @@ pub fn run(
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
-    let mut meshes = MeshRenderer::new(&gpu, &world, scene.mesh_occlusion)?;
+    let occlusion = scene.mesh_occlusion.unwrap_or_default();
+    let mut meshes = MeshRenderer::new(&gpu, &world, occlusion)?;
     meshes.set_clips(&turn.clips(&scene.clips))?;
     let mut timings = cao_gpu::Timings::new();
     let mut out = Out::new(global);
@@ -106,7 +107,7 @@ pub fn run(
         pictures.finish(files)
     })?;
     drop(progress);
-    out.meshes(&world, &scene.mesh_occlusion, meshes.delta_mm());
+    out.meshes(&world, &occlusion, meshes.delta_mm());
     out.image(size);
     out.timings(&timings);
     for path in targets.paths() {

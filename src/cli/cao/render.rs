@@ -3,6 +3,8 @@
 use crate::args::{self, Global, Render, usage};
 use crate::{budget, meshes};
 use anyhow::Result;
+use cao::image_space::method::image_method;
+use cao::image_space::of_picture::OfPicture;
 use cao::renderer::{Bands, COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
@@ -51,10 +53,17 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let mut setup = scene.occlusion.setup(volume.min_spacing())?;
     setup.occlusion.light = turn.ambient_light(&setup.occlusion.light);
     let look = turn.look(&scene.look);
-    if !look.shading.occluded() {
+    let image_space = scene.mesh_occlusion.map(|pixels| {
+        let half = Vec3::from_array(volume.size_mm().map(|size| 0.5 * size as f32));
+        (pixels, pixels.delta_mm((-half, half)))
+    });
+    if image_space.is_some() && args.method.is_some() {
+        return Err(usage("--method: the scene's [mesh_occlusion] takes the place of a volume's methods"));
+    }
+    if image_space.is_some() || !look.shading.occluded() {
         if args.budget.given() {
             return Err(usage(
-                "--budget-error, --budget-ms: they choose an occlusion, and --shading or the scene shows none",
+                "--budget-error, --budget-ms: they choose a volume's occlusion, and --shading or the scene shows none",
             ));
         }
         // What is not shown is not computed: without a neighbourhood nothing is occluded.
@@ -72,7 +81,10 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     targets.spare_inputs()?;
     progress.stage("preparing");
     let gpu = open_gpu(global)?;
-    let bands = Bands::new(&gpu, size, 2)?;
+    let bands = match image_space {
+        Some(_) => None,
+        None => Some(Bands::new(&gpu, size, 2)?),
+    };
     let mut renderer = Renderer::new(&gpu, &volume, transfer, setup, COLOUR)?;
     args.settings.give_network(&mut renderer)?;
     renderer.set_clips(&turn.clips(&scene.clips))?;
@@ -86,12 +98,20 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     let views = views(&rig)?;
     targets.write(|files| {
         let mut pictures = Pictures::begin(files, args, size, scene.image.background)?;
-        timings.extend(renderer.draw_bands(&views, &look, bands, &mut |first, band| {
-            files.go_on()?;
-            pictures.add(band)?;
-            progress.set(f64::from(first + band.size[1]) / f64::from(size[1]));
-            anyhow::Ok(())
-        })?);
+        if let Some(bands) = bands {
+            timings.extend(renderer.draw_bands(&views, &look, bands, &mut |first, band| {
+                files.go_on()?;
+                pictures.add(band)?;
+                progress.set(f64::from(first + band.size[1]) / f64::from(size[1]));
+                anyhow::Ok(())
+            })?);
+        }
+        if let Some(method) = image_space.and_then(|(pixels, delta_mm)| image_method(&pixels, delta_mm)) {
+            // Its values depend on what else the picture shows: no bands.
+            let (image, drawn) = OfPicture::draw(&gpu, &renderer, &views, &look, size, &method)?;
+            pictures.add(&image)?;
+            timings.extend(drawn);
+        }
         check_validation(&gpu)?;
         pictures.finish(files)
     })?;
@@ -100,7 +120,10 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
     out.device(&gpu);
     out.volume(&args.input, &volume);
     out.features(&features);
-    out.setup(renderer.setup(), &volume);
+    match &image_space {
+        Some((pixels, delta_mm)) => out.pixels(pixels, *delta_mm),
+        None => out.setup(renderer.setup(), &volume),
+    }
     if let Some(planned) = &planned {
         planned.print(&mut out);
     }
