@@ -57,6 +57,7 @@ const CAPABILITIES: Capabilities = Capabilities::IMMEDIATES
     // `pack2x16float` and `unpack2x16float`, which every device has; what naga asks of GL.
     .union(Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     .union(Capabilities::STORAGE_TEXTURE_16BIT_NORM_FORMATS)
+    .union(Capabilities::RAY_QUERY)
     .union(Capabilities::TEXTURE_ATOMIC);
 
 /// The folder of files that kernels include.

@@ -52,6 +52,7 @@ mod ssao;
 mod sums;
 mod tiles;
 mod trace;
+mod trace_queries;
 mod upsample;
 mod vicinity;
 mod volumes;

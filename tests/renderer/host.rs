@@ -123,6 +123,7 @@ impl Host {
     fn adopt(&self, queue: Option<vk::Queue>, compute_only: bool) -> cao_gpu::Result<Gpu> {
         let adopted = Adopted {
             compute_only,
+            ray_queries: false,
             entry: self.entry.clone(),
             instance: self.instance.clone(),
             physical_device: self.physical,
