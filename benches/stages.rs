@@ -1,9 +1,12 @@
 //! Kernels, by the device's timestamps: the time that a stage takes inside an update or a frame, not that of the calls
-//! around it. 32³ voxels, 8 voxels radius, 128² pixels for each eye. On a software driver only ratios mean anything.
+//! around it. 32³ voxels, 8 voxels radius, 128² pixels for each eye; rays of meshes at 80 × 45 pixels for each eye. On a software driver only ratios mean
+//! anything.
 
 #![forbid(unsafe_code)]
 
 use cao::glam::Vec3;
+use cao::mesh::ambient::ByRays;
+use cao::mesh_renderer::MeshRenderer;
 use cao::renderer::COLOUR;
 use cao::{
     Clip, Gpu, Method, OpenOptions, Pose, Quadrature, RaySet, Renderer, Setup, Shape, StereoRig,
@@ -11,6 +14,8 @@ use cao::{
 };
 use cao_gpu::Timings;
 use cao_model::look::Look;
+use cao_model::scenes::BuiltScene;
+use cao_model::surface::World;
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::sync::Arc;
 use std::time::Duration;
@@ -139,5 +144,36 @@ fn stages(criterion: &mut Criterion) {
     bench.group.finish();
 }
 
-criterion_group! { name = benches; config = cao_benches::brief(); targets = stages }
+/// 16 rays a pixel of meshes, without masks and with: walks through the tree, and queries where the device has them.
+fn rays(criterion: &mut Criterion) {
+    let gpu = Gpu::open(&OpenOptions::default()).expect("a Vulkan device");
+    let mut group = criterion.benchmark_group("rays of meshes");
+    let size = [80, 45];
+    for name in ["colonnade", "trees"] {
+        let scene = BuiltScene::parse(name).expect("a scene");
+        let world = World::new(&(scene.make)(scene.detail)).expect("a world");
+        let views = scene.eye.views(size[0] as f32 / size[1] as f32, 1.0, 1e5).expect("views");
+        let mut ways = vec![("walks", ByRays::walks(&gpu, 16).expect("rays"))];
+        if gpu.ray_queries() {
+            ways.push(("queries", ByRays::queries(&gpu, 16).expect("rays")));
+        }
+        for (way, rays) in ways {
+            let made = MeshRenderer::with(&gpu, &world, Box::new(rays), scene.delta_mm);
+            let mut renderer = made.expect("a renderer");
+            group.bench_function(format!("{name}, {way}"), |b| {
+                b.iter_custom(|iterations| {
+                    (0..iterations)
+                        .map(|_| {
+                            let drawn = renderer.draw(&views, &Look::default(), size, None, &mut |_| ());
+                            of("trace", &drawn.expect("a picture").1)
+                        })
+                        .sum()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group! { name = benches; config = cao_benches::brief(); targets = stages, rays }
 criterion_main!(benches);

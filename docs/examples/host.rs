@@ -59,6 +59,7 @@ impl Host {
             device: self.device.clone(),
             queue_family: self.family,
             compute_only: false,
+            ray_queries: false,
             queue: Some(self.queue),
         }
     }

@@ -51,12 +51,14 @@ pub struct Options {
     pub debug: bool,
 }
 
-/// What the shaders may use beyond plain WGSL; each has its feature in the Vulkan layer's `feature.rs` or is core in Vulkan 1.3.
+/// What the shaders may use beyond plain WGSL; each has its feature in the Vulkan layer's `feature.rs` or is core in Vulkan 1.3. Ray
+/// queries are optional there: it refuses their kernels where a device has none.
 const CAPABILITIES: Capabilities = Capabilities::IMMEDIATES
     .union(Capabilities::MULTIVIEW)
     // `pack2x16float` and `unpack2x16float`, which every device has; what naga asks of GL.
     .union(Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     .union(Capabilities::STORAGE_TEXTURE_16BIT_NORM_FORMATS)
+    .union(Capabilities::RAY_QUERY)
     .union(Capabilities::TEXTURE_ATOMIC);
 
 /// The folder of files that kernels include.
@@ -226,13 +228,16 @@ pub fn build(root: &str) -> Result<(), Box<dyn Error>> {
 /// * coordinates are Vulkan's: no flip of y;
 /// * workgroup memory is not zeroed (250 times slower on lavapipe): shaders write before they read;
 /// * no checks of divisors and no bounds on loops: the shaders are tested;
-/// * no 16-bit input and output, which lavapipe lacks.
+/// * no 16-bit input and output, which lavapipe lacks;
+/// * SPIR-V 1.3, and 1.4, which `VK_KHR_ray_query` asks for, where rays are queried.
 fn spirv_options(module: &Module, options: Options) -> spv::Options<'static> {
     // A binding keeps the number it has in the source; without faked bindings, naga wants that said.
     let bindings = module.global_variables.iter().filter_map(|(_, variable)| variable.binding);
     let identity = |b: ResourceBinding| {
         (b, spv::BindingInfo { descriptor_set: b.group, binding: b.binding, binding_array_size: None })
     };
+    let queries =
+        module.types.iter().any(|(_, ty)| matches!(ty.inner, TypeInner::AccelerationStructure { .. }));
     let atomics = module.types.iter().any(|(_, ty)| matches!(ty.inner, TypeInner::Atomic(_)));
     let bounds = match options.bounds {
         Bounds::Unchecked => BoundsCheckPolicies {
@@ -249,7 +254,7 @@ fn spirv_options(module: &Module, options: Options) -> spv::Options<'static> {
         },
     };
     spv::Options {
-        lang_version: (1, 3),
+        lang_version: if queries { (1, 4) } else { (1, 3) },
         flags: if options.debug { spv::WriterFlags::DEBUG } else { spv::WriterFlags::empty() },
         fake_missing_bindings: false,
         binding_map: bindings.map(identity).collect(),

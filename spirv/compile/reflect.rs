@@ -78,6 +78,7 @@ fn binding(module: &Module, variable: &GlobalVariable, bytes: u32) -> Result<Opt
         (AddressSpace::Uniform, _) => (BindingKind::Uniform, None),
         (AddressSpace::Storage { .. }, _) => (BindingKind::Storage, None),
         (_, TypeInner::Sampler { .. }) => (BindingKind::Sampler, None),
+        (_, TypeInner::AccelerationStructure { .. }) => (BindingKind::AccelerationStructure, None),
         (_, TypeInner::Image { dim, arrayed, class }) => {
             let view = match (dim, arrayed) {
                 (ImageDimension::D2, false) => ViewDim::D2,

@@ -101,6 +101,8 @@ pub enum BindingKind {
     StorageImage,
     /// `sampler`
     Sampler,
+    /// `acceleration_structure`
+    AccelerationStructure,
 }
 
 /// What an image binding expects of the image.

@@ -1,8 +1,7 @@
-// Rays through the world, which pass what clips hide. Kernels bind `tree` over the triangles' boxes, `triangles`, `clips`, `layers`, and what
-// `surface.wgsl` asks for.
+// Rays through the world, which pass what clips hide. Kernels bind `tree` over the triangles' boxes, `triangles`, and what `there.wgsl`
+// asks for.
 
-#include "shared/surface.wgsl"
-#include "shared/clips.wgsl"
+#include "shared/there.wgsl"
 
 struct Hit {
     // way along the ray, in its direction's lengths
@@ -31,19 +30,6 @@ fn hit_of(triangle: WorldTriangle, origin: vec3<f32>, direction: vec3<f32>) -> v
     let t = dot(ac, turned) / volume;
     let inside = volume != 0.0 && u >= -EDGE && v >= -EDGE && u + v <= 1.0 + EDGE;
     return select(vec3(-1.0), vec3(t, u, v), inside);
-}
-
-fn is_there(index: u32, triangle: WorldTriangle, at: vec2<f32>) -> bool {
-    if (u32(triangle.c.w) & MASKED) == 0u {
-        return true;
-    }
-    let material = materials.material[u32(triangle.b.w)];
-    return material.colour.a * texture_at(material, uv_at(looks.triangle[index], at)).a >= material.cutoff;
-}
-
-// Whether clips leave a place of a triangle.
-fn is_left(triangle: WorldTriangle, place: vec3<f32>) -> bool {
-    return (u32(triangle.c.w) & SPARED) != 0u || visible(place);
 }
 
 // The first hit behind `begin` and before `end`; of none NO_TRIANGLE, at `end`.

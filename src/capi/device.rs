@@ -215,8 +215,16 @@ unsafe fn adopt(info: &CaoDeviceInfo) -> Result<Gpu> {
     }
     let queue = (!info.queue.is_null()).then(|| vk::Queue::from_raw(raw(info.queue)));
     let queue_family = info.queue_family;
-    let adopted =
-        Adopted { entry, instance, physical_device, device, queue_family, compute_only: false, queue };
+    let adopted = Adopted {
+        entry,
+        instance,
+        physical_device,
+        device,
+        queue_family,
+        compute_only: false,
+        ray_queries: false,
+        queue,
+    };
     // SAFETY: the caller's promise.
     Ok(unsafe { Gpu::adopt(adopted) }?)
 }

@@ -24,6 +24,12 @@ pub enum Access {
     GraphicsRead,
     /// Colour or depth attachment, loaded, tested, blended or stored.
     AttachmentWrite,
+    /// What an acceleration structure is built of: triangles, instances, a lower level.
+    BuildRead,
+    /// An acceleration structure that is built, and the scratch memory of that.
+    BuildWrite,
+    /// An acceleration structure read by a compute shader's ray queries.
+    QueryRead,
     /// Mapped memory read by the program after the commands have run.
     HostRead,
     /// Mapped memory written by the program before they run.
@@ -52,6 +58,14 @@ impl Access {
                     | A::DEPTH_STENCIL_ATTACHMENT_READ
                     | A::DEPTH_STENCIL_ATTACHMENT_WRITE,
             ),
+            Access::BuildRead => {
+                (S::ACCELERATION_STRUCTURE_BUILD_KHR, A::SHADER_READ | A::ACCELERATION_STRUCTURE_READ_KHR)
+            }
+            Access::BuildWrite => (
+                S::ACCELERATION_STRUCTURE_BUILD_KHR,
+                A::ACCELERATION_STRUCTURE_READ_KHR | A::ACCELERATION_STRUCTURE_WRITE_KHR,
+            ),
+            Access::QueryRead => (S::COMPUTE_SHADER, A::ACCELERATION_STRUCTURE_READ_KHR),
             Access::HostRead => (S::HOST, A::HOST_READ),
             Access::HostWrite => (S::HOST, A::HOST_WRITE),
         }
@@ -61,7 +75,11 @@ impl Access {
     pub fn writes(self) -> bool {
         matches!(
             self,
-            Access::TransferWrite | Access::StorageWrite | Access::AttachmentWrite | Access::HostWrite
+            Access::TransferWrite
+                | Access::StorageWrite
+                | Access::AttachmentWrite
+                | Access::BuildWrite
+                | Access::HostWrite
         )
     }
 
@@ -70,10 +88,14 @@ impl Access {
         1 << self as u16
     }
 
-    /// Pipeline stages and access masks of several accesses together; of those that draw only where something can.
-    pub(crate) fn union(list: &[Access], graphics: bool) -> (S, A) {
+    /// Pipeline stages and access masks of several accesses together; of those that draw only where something can, of those of ray queries
+    /// only where there are some.
+    pub(crate) fn union(list: &[Access], graphics: bool, rays: bool) -> (S, A) {
         let drawing = |access: Access| matches!(access, Access::GraphicsRead | Access::AttachmentWrite);
-        let list = list.iter().filter(|access| graphics || !drawing(**access));
+        let of_rays =
+            |access: Access| matches!(access, Access::BuildRead | Access::BuildWrite | Access::QueryRead);
+        let there = |access: Access| (graphics || !drawing(access)) && (rays || !of_rays(access));
+        let list = list.iter().filter(|access| there(**access));
         list.fold((S::NONE, A::NONE), |(stages, masks), access| {
             let row = access.row();
             (stages | row.0, masks | row.1)
@@ -87,10 +109,11 @@ mod tests {
 
     #[test]
     fn several_accesses_unite_stages_and_masks() {
-        let list = [Access::StorageWrite, Access::TransferRead, Access::GraphicsRead];
-        let (stages, masks) = Access::union(&list[..2], true);
+        let list = [Access::StorageWrite, Access::TransferRead, Access::GraphicsRead, Access::QueryRead];
+        let (stages, masks) = Access::union(&list[..2], true, true);
         assert_eq!(stages, S::COMPUTE_SHADER | S::ALL_TRANSFER);
         assert_eq!(masks, A::SHADER_STORAGE_WRITE | A::TRANSFER_READ);
-        assert_eq!(Access::union(&list, false), (stages, masks), "no stage that the queue does not have");
+        let without = Access::union(&list, false, false);
+        assert_eq!(without, (stages, masks), "no stage and no access that the device does not have");
     }
 }

@@ -1,7 +1,7 @@
 //! Binding by name: what the host passes against what the shader declares.
 
 use super::{
-    Buffer, Image, ImageUse, Sampler,
+    AccelerationStructure, Buffer, Image, ImageUse, Sampler,
     access::Access,
     hazard::Touch,
     pipeline::{PipelineInner, Slot, descriptor_type},
@@ -24,6 +24,8 @@ pub enum Bind<'a> {
     Layer(&'a Image, u32),
     /// A sampler.
     Sampler(&'a Sampler),
+    /// What ray queries go through.
+    Acceleration(&'a AccelerationStructure),
 }
 
 impl<'a> From<&'a Buffer> for Bind<'a> {
@@ -41,6 +43,12 @@ impl<'a> From<&'a Image> for Bind<'a> {
 impl<'a> From<&'a Sampler> for Bind<'a> {
     fn from(sampler: &'a Sampler) -> Self {
         Self::Sampler(sampler)
+    }
+}
+
+impl<'a> From<&'a AccelerationStructure> for Bind<'a> {
+    fn from(structure: &'a AccelerationStructure) -> Self {
+        Self::Acceleration(structure)
     }
 }
 
@@ -95,12 +103,13 @@ pub(crate) type Keep = Arc<dyn Any + Send + Sync>;
 pub(crate) struct Resolved<'a> {
     pub touches: Vec<Touch<'a>>,
     pub keep: Vec<Keep>,
-    descriptors: Vec<(u32, vk::DescriptorType, Descriptor)>,
+    descriptors: Vec<(u32, vk::DescriptorType, Descriptor<'a>)>,
 }
 
-enum Descriptor {
+enum Descriptor<'a> {
     Buffer([vk::DescriptorBufferInfo; 1]),
     Image([vk::DescriptorImageInfo; 1]),
+    Acceleration(vk::WriteDescriptorSetAccelerationStructureKHR<'a>),
 }
 
 impl Resolved<'_> {
@@ -113,6 +122,12 @@ impl Resolved<'_> {
                 match descriptor {
                     Descriptor::Buffer(info) => write.buffer_info(info),
                     Descriptor::Image(info) => write.image_info(info),
+                    Descriptor::Acceleration(info) => {
+                        // What `push_next` does, of a struct that stays as it is; it lives as long as `self`, as the result says.
+                        let mut write = write.descriptor_count(1);
+                        write.p_next = std::ptr::from_ref(info).cast();
+                        write
+                    }
                 }
             })
             .collect()
@@ -176,6 +191,9 @@ fn one<'a>(
             out.keep.push(sampler.0.clone());
             Ok(Descriptor::Image([vk::DescriptorImageInfo::default().sampler(sampler.0.raw)]))
         }
+        (BindingKind::AccelerationStructure, Bind::Acceleration(structure)) => {
+            acceleration(pipeline, slot, name, structure, out)
+        }
         (kind, bind) => Err(format!("is a {kind:?} in the shader, given is {}", describe(bind))),
     };
     Ok(descriptor.map(|d| out.descriptors.push((slot.binding.binding, descriptor_type(kind), d))))
@@ -186,6 +204,7 @@ fn describe(bind: Bind<'_>) -> String {
         Bind::Buffer(b) | Bind::BufferRange(b, ..) => format!("buffer {}", b.name()),
         Bind::Image(i) | Bind::Layer(i, _) => format!("image {}", i.name()),
         Bind::Sampler(_) => "a sampler".into(),
+        Bind::Acceleration(a) => format!("acceleration structure {}", a.name()),
     }
 }
 
@@ -197,7 +216,7 @@ fn buffer_range<'a>(
     offset: u64,
     size: u64,
     out: &mut Resolved<'a>,
-) -> Result<Result<Descriptor, String>> {
+) -> Result<Result<Descriptor<'a>, String>> {
     let info = &pipeline.gpu.info;
     let (limit, alignment) = match slot.binding.kind {
         BindingKind::Uniform => (info.max_uniform_range, info.uniform_alignment),
@@ -251,7 +270,7 @@ fn image_view<'a>(
     image: &'a Image,
     layer: Option<u32>,
     out: &mut Resolved<'a>,
-) -> Result<Descriptor, String> {
+) -> Result<Descriptor<'a>, String> {
     let desc = image.desc();
     let Some(wanted) = slot.binding.image else { return Err("is not an image in the shader".into()) };
     let needs = if slot.binding.kind == BindingKind::Sampled { ImageUse::SAMPLED } else { ImageUse::STORAGE };
@@ -297,12 +316,40 @@ fn image_view<'a>(
     Ok(Descriptor::Image([info]))
 }
 
+fn acceleration<'a>(
+    pipeline: &PipelineInner,
+    slot: &Slot,
+    name: &'a str,
+    structure: &'a AccelerationStructure,
+    out: &mut Resolved<'a>,
+) -> Result<Descriptor<'a>, String> {
+    if pipeline.targets.is_some() {
+        return Err("is queried while drawing; only compute shaders query rays".into());
+    }
+    for level in structure.levels() {
+        let read = Touch {
+            id: level.buffer.0.id,
+            name: level.buffer.name(),
+            via: name,
+            range: 0..level.buffer.bytes(),
+            access: Access::QueryRead,
+        };
+        touch(pipeline, slot, read, out);
+    }
+    out.keep.push(structure.0.clone());
+    let top = std::slice::from_ref(structure.top());
+    Ok(Descriptor::Acceleration(
+        vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(top),
+    ))
+}
+
 /// Notes what the entry points do through this slot; the access in `touch` is replaced.
 fn touch<'a>(pipeline: &PipelineInner, slot: &Slot, touch: Touch<'a>, out: &mut Resolved<'a>) {
     let read = match slot.binding.kind {
         _ if pipeline.targets.is_some() => Access::GraphicsRead,
         BindingKind::Uniform => Access::UniformRead,
         BindingKind::Sampled => Access::SampledRead,
+        BindingKind::AccelerationStructure => Access::QueryRead,
         BindingKind::Storage | BindingKind::StorageImage | BindingKind::Sampler => Access::StorageRead,
     };
     if slot.reads {

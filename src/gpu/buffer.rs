@@ -13,7 +13,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// What a buffer is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BufferUse {
-    /// Device memory: storage, uniform, indirect arguments, source and destination of copies.
+    /// Device memory: storage, uniform, indirect arguments, source and destination of copies; where there are ray queries also what
+    /// acceleration structures are built of.
     Device,
     /// Mapped, written by the program, read by the device: source of copies, storage, uniform.
     Upload,
@@ -43,6 +44,17 @@ impl Gpu {
     /// # Errors
     /// [`Error::Config`] for 0 bytes, [`Error::Limit`] beyond the device's largest, [`Error::Memory`] or [`Error::Vulkan`] if the device refuses.
     pub fn buffer(&self, name: &str, bytes: u64, kind: BufferUse) -> Result<Buffer> {
+        self.buffer_also(name, bytes, kind, vk::BufferUsageFlags::empty())
+    }
+
+    /// The same, with usages beside those of its kind.
+    pub(crate) fn buffer_also(
+        &self,
+        name: &str,
+        bytes: u64,
+        kind: BufferUse,
+        also: vk::BufferUsageFlags,
+    ) -> Result<Buffer> {
         use vk::BufferUsageFlags as U;
         if bytes == 0 {
             return Err(Error::Config {
@@ -73,7 +85,13 @@ impl Gpu {
             BufferUse::Readback => (U::TRANSFER_DST, MemoryLocation::GpuToCpu),
         };
         let gpu = &self.0;
-        let create = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        let of_rays = match kind {
+            BufferUse::Device if gpu.rays.is_some() => {
+                U::SHADER_DEVICE_ADDRESS | U::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+            }
+            _ => U::empty(),
+        };
+        let create = vk::BufferCreateInfo::default().size(bytes).usage(usage | of_rays | also);
         // SAFETY: the device is alive; sizes above its limits are refused by it.
         let raw =
             unsafe { gpu.device.create_buffer(&create, None) }.map_err(vulkan("vkCreateBuffer", name))?;

@@ -1,8 +1,9 @@
 //! The device: opened by us, or adopted from a host that owns it.
 
 use super::{
+    acceleration::Rays,
     counts::Counts,
-    feature::{self, API_VERSION, EXTENSIONS, Features},
+    feature::{self, API_VERSION, EXTENSIONS, Features, RAY_QUERIES, RayQueries},
     format::{Format, VulkanFormat},
     hazard::{Hazards, ResourceId},
     idle::Idle,
@@ -56,6 +57,9 @@ pub struct Adopted {
     pub queue_family: u32,
     /// Do without graphics even where the family has them.
     pub compute_only: bool,
+    /// The device was made with the extensions of [`feature::RAY_QUERIES`](crate::feature::RAY_QUERIES) and their features, which are
+    /// used then.
+    pub ray_queries: bool,
     /// A queue of that family lent to the calls that say they use one (uploads, read-backs): during such a call
     /// nobody else may use it. `None`: those calls refuse, and recording into the host's command buffers is all there is.
     pub queue: Option<vk::Queue>,
@@ -70,6 +74,8 @@ pub(crate) struct Inner {
     pub push_descriptor: ash::khr::push_descriptor::Device,
     /// Names and labels, if the instance has them.
     pub debug: Option<ash::ext::debug_utils::Device>,
+    /// What acceleration structures need, if the device was made for ray queries.
+    pub rays: Option<Rays>,
     /// Locked for submission; `None` for an adopted device, whose queue is the host's.
     pub queue: Option<Mutex<vk::Queue>>,
     pub queue_family: u32,
@@ -205,8 +211,8 @@ impl Gpu {
         let wanted = options.device.clone().or_else(|| environment("CAO_DEVICE"));
         let log = ValidationLog::default();
         let instance = Instance::new(validation.then_some(&log))?;
-        let device = Self::create_device(&instance, wanted.as_deref());
-        let (physical, info, device, family) = device.inspect_err(|_| {
+        let device = Self::create_device(&instance, wanted.as_deref(), options.plain);
+        let (physical, info, device, family, ray_queries) = device.inspect_err(|_| {
             // SAFETY: no device was made of it.
             unsafe { instance.destroy() }
         })?;
@@ -237,6 +243,7 @@ impl Gpu {
             debug,
             log,
             compute_only: false,
+            ray_queries,
             plain: options.plain,
         };
         // `Inner` owns all from here on; what fails inside destroys nothing of it, so that is done here.
@@ -246,7 +253,8 @@ impl Gpu {
     fn create_device(
         instance: &Instance,
         wanted: Option<&str>,
-    ) -> Result<(vk::PhysicalDevice, DeviceInfo, ash::Device, u32)> {
+        plain: bool,
+    ) -> Result<(vk::PhysicalDevice, DeviceInfo, ash::Device, u32, bool)> {
         let mut devices = instance.devices()?;
         let infos: Vec<_> = devices.iter().map(|(_, info)| info.clone()).collect();
         let (physical, info) = devices.swap_remove(choose(&infos, wanted)?);
@@ -258,16 +266,23 @@ impl Gpu {
         })? as u32;
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let names: Vec<_> = EXTENSIONS.iter().map(|name| name.as_ptr()).collect();
+        let ray_queries = !plain && RayQueries::of(&instance.instance, physical);
+        let of_rays = if ray_queries { RAY_QUERIES } else { &[] };
+        let names: Vec<_> = EXTENSIONS.iter().chain(of_rays).map(|name| name.as_ptr()).collect();
         let mut features = Features::required();
         let mut chain = features.chain();
-        let create = vk::DeviceCreateInfo::default()
+        let mut rays = RayQueries::enabled();
+        let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&names)
             .push_next(&mut chain);
-        // SAFETY: `create` and what it points to live until the call returns; features and extensions were checked by `choose`.
+        if ray_queries {
+            create = rays.push(create);
+        }
+        // SAFETY: `create` and what it points to live until the call returns; features and extensions were checked by `choose` and above.
         let device = unsafe { instance.instance.create_device(physical, &create, None) };
-        Ok((physical, info.clone(), device.map_err(vulkan("vkCreateDevice", &info.name))?, family))
+        let device = device.map_err(vulkan("vkCreateDevice", &info.name))?;
+        Ok((physical, info.clone(), device, family, ray_queries))
     }
 
     /// Uses a host's device. Commands go through [`Gpu::record_into`] into the host's command buffers and nothing submits or waits, except
@@ -295,6 +310,7 @@ impl Gpu {
             debug: false,
             log: ValidationLog::default(),
             compute_only: host.compute_only,
+            ray_queries: host.ray_queries,
             plain: false,
         };
         parts.build(None)
@@ -312,7 +328,7 @@ impl Gpu {
 
     /// What [`Gpu::adopt`] could not check and took on trust, in words; empty for a device of our own.
     pub fn on_trust(&self) -> Vec<String> {
-        if self.0.owned.is_some() { Vec::new() } else { feature::on_trust() }
+        if self.0.owned.is_some() { Vec::new() } else { feature::on_trust(self.ray_queries()) }
     }
 
     /// Device extensions that an adopted device must have.
@@ -348,6 +364,11 @@ impl Gpu {
     /// Whether all that is optional is done without ([`OpenOptions::plain`]).
     pub fn plain(&self) -> bool {
         self.0.plain
+    }
+
+    /// Whether kernels may query rays here: [`Gpu::acceleration_structure`].
+    pub fn ray_queries(&self) -> bool {
+        self.0.rays.is_some()
     }
 
     /// Messages of the validation layer so far; empty without validation.
@@ -402,6 +423,7 @@ struct Parts {
     debug: bool,
     log: ValidationLog,
     compute_only: bool,
+    ray_queries: bool,
     plain: bool,
 }
 
@@ -430,8 +452,8 @@ fn calls(instance: &ash::Instance, device: &ash::Device) -> Result<ash::DeviceFn
 
 impl Parts {
     fn build(self, owned: Option<Owned>) -> Result<Gpu> {
-        let Self { entry, instance, physical, info, device, family, queue, debug, log, compute_only, plain } =
-            self;
+        let Self { entry, instance, physical, info, device, family, queue, debug, log, .. } = self;
+        let Self { compute_only, ray_queries, plain, .. } = self;
         // SAFETY: `physical` was enumerated from this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let does = families.get(family as usize).map_or(vk::QueueFlags::empty(), |f| f.queue_flags);
@@ -444,9 +466,12 @@ impl Parts {
                 Err(Error::Device { problem })
             }
         };
-        let made = computes()
-            .and_then(|()| Ok((calls(&instance, &device)?, Memory::new(&instance, physical, &device)?)));
-        let (v13, memory) = match made {
+        let made = computes().and_then(|()| {
+            let rays = ray_queries.then(|| Rays::new(&instance, physical, &device)).transpose()?;
+            let memory = Memory::new(&instance, physical, &device, ray_queries)?;
+            Ok((calls(&instance, &device)?, memory, rays))
+        });
+        let (v13, memory, rays) = match made {
             Ok(made) => made,
             Err(error) => {
                 if let Some(owned) = owned {
@@ -464,6 +489,7 @@ impl Parts {
             queue_family: family,
             graphics: does.contains(vk::QueueFlags::GRAPHICS) && !compute_only,
             plain,
+            rays,
             v13,
             timestamp_mask: u64::MAX.checked_shr(64 - bits).unwrap_or(0),
             info,

@@ -18,6 +18,13 @@ pub const BEFORE_1_3: &[&CStr] = &[
     ash::khr::create_renderpass2::NAME,
 ];
 
+/// Extensions of ray queries. Their features are `accelerationStructure`, `rayQuery` and, of Vulkan 1.2, `bufferDeviceAddress`.
+pub const RAY_QUERIES: &[&CStr] = &[
+    ash::khr::acceleration_structure::NAME,
+    ash::khr::deferred_host_operations::NAME,
+    ash::khr::ray_query::NAME,
+];
+
 /// Calls in use that are not of Vulkan 1.1, and what brings them.
 pub(crate) const CALLS: &[(&CStr, &str)] = &[
     (c"vkCmdPushDescriptorSetKHR", "VK_KHR_push_descriptor"),
@@ -38,6 +45,10 @@ const OPTIONAL: &[(&str, &str)] = &[
     ("timestamps of the queue", "stages have no times"),
     ("a queue of graphics", "pictures only, which the host presents; no clip meshes"),
     ("VK_EXT_debug_utils, on a device of our own", "objects have no names in a debugger"),
+    (
+        "VK_KHR_ray_query and VK_KHR_acceleration_structure, enabled by us or as Adopted::ray_queries says",
+        "rays through meshes walk a tree of ours",
+    ),
 ];
 
 /// The required, in words.
@@ -56,11 +67,69 @@ pub(crate) fn optional() -> Vec<String> {
 }
 
 /// What no call tells of a device.
-pub(crate) fn on_trust() -> Vec<String> {
-    let features = FEATURES.iter().map(|f| format!("feature {} was enabled ({})", f.name, f.why));
+pub(crate) fn on_trust(ray_queries: bool) -> Vec<String> {
+    let features = FEATURES.iter().map(|f| (f.name, f.why));
+    let of_rays = ["accelerationStructure", "rayQuery", "bufferDeviceAddress"];
+    let of_rays = of_rays.into_iter().filter(|_| ray_queries).map(|name| (name, "ray queries"));
+    let enabled = features.chain(of_rays).map(|(name, why)| format!("feature {name} was enabled ({why})"));
     let others =
         ["handles belong together and outlive what is made of them", "nobody else uses a lent queue"];
-    features.chain(others.map(str::to_owned)).collect()
+    enabled.chain(others.map(str::to_owned)).collect()
+}
+
+/// Feature structs of ray queries, to be asked for or enabled.
+#[derive(Default)]
+pub(crate) struct RayQueries {
+    structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'static>,
+    queries: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
+    addresses: vk::PhysicalDeviceBufferDeviceAddressFeatures<'static>,
+}
+
+impl RayQueries {
+    /// What [`Self::push`] enables.
+    pub fn enabled() -> Self {
+        Self {
+            structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default()
+                .acceleration_structure(true),
+            queries: vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true),
+            addresses: vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true),
+        }
+    }
+
+    /// The structs added to what `vkCreateDevice` takes.
+    pub fn push<'a>(&'a mut self, create: vk::DeviceCreateInfo<'a>) -> vk::DeviceCreateInfo<'a> {
+        create.push_next(&mut self.structures).push_next(&mut self.queries).push_next(&mut self.addresses)
+    }
+
+    /// Whether a device has all of it. Those without the extensions must not be asked for their features.
+    pub fn of(instance: &ash::Instance, device: vk::PhysicalDevice) -> bool {
+        let extensions = extensions(instance, device);
+        if !RAY_QUERIES.iter().all(|wanted| has(&extensions, wanted)) {
+            return false;
+        }
+        let mut found = Self::default();
+        let mut chain = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut found.structures)
+            .push_next(&mut found.queries)
+            .push_next(&mut found.addresses);
+        // SAFETY: `device` was enumerated from `instance`, and the chained structs outlive the call.
+        unsafe { instance.get_physical_device_features2(device, &mut chain) };
+        let all = [
+            found.structures.acceleration_structure,
+            found.queries.ray_query,
+            found.addresses.buffer_device_address,
+        ];
+        all == [vk::TRUE; 3]
+    }
+}
+
+fn extensions(instance: &ash::Instance, device: vk::PhysicalDevice) -> Vec<vk::ExtensionProperties> {
+    // SAFETY: `device` was enumerated from `instance`.
+    unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default()
+}
+
+fn has(extensions: &[vk::ExtensionProperties], wanted: &CStr) -> bool {
+    extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(wanted))
 }
 
 /// Feature structs of one device, to be asked for or enabled.
@@ -218,10 +287,9 @@ pub(crate) fn missing(instance: &ash::Instance, device: vk::PhysicalDevice) -> V
         return vec![format!("Vulkan 1.3 (has {major}.{minor})")];
     }
     let mut missing = Features::of(instance, device).missing();
-    // SAFETY: `device` was enumerated from `instance`.
-    let extensions = unsafe { instance.enumerate_device_extension_properties(device) }.unwrap_or_default();
+    let extensions = extensions(instance, device);
     for wanted in EXTENSIONS {
-        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(wanted)) {
+        if !has(&extensions, wanted) {
             missing.push(format!("extension {}", wanted.to_string_lossy()));
         }
     }

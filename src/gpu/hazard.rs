@@ -312,6 +312,9 @@ mod tests {
             IndirectRead,
             GraphicsRead,
             AttachmentWrite,
+            BuildRead,
+            BuildWrite,
+            QueryRead,
         ];
         for first in all {
             for second in all {

@@ -17,6 +17,7 @@
 //! * Safe functions refuse calls that Vulkan leaves undefined; what only a promise can rule out is `unsafe`: a host's handles, and code
 //!   for the device with what it does on the numbers that it is given ([`Shader::new`]).
 
+mod acceleration;
 mod access;
 mod bind;
 mod buffer;
@@ -39,6 +40,7 @@ mod timing;
 mod transfer;
 mod validation;
 
+pub use acceleration::{AccelerationStructure, Corners};
 pub use access::Access;
 pub use bind::{Bind, Bindings, Flat};
 pub use buffer::{Buffer, BufferUse};

@@ -22,7 +22,13 @@ struct State {
 }
 
 impl Memory {
-    pub fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Result<Self> {
+    /// `addressed`: shaders and acceleration structures may know buffers by their addresses.
+    pub fn new(
+        instance: &ash::Instance,
+        physical: vk::PhysicalDevice,
+        device: &ash::Device,
+        addressed: bool,
+    ) -> Result<Self> {
         // What leaks is said by `report`, to who asks.
         let mut debug_settings = AllocatorDebugSettings::default();
         debug_settings.log_leaks_on_shutdown = false;
@@ -31,7 +37,7 @@ impl Memory {
             device: device.clone(),
             physical_device: physical,
             debug_settings,
-            buffer_device_address: false,
+            buffer_device_address: addressed,
             allocation_sizes: AllocationSizes::new(BLOCK[0], BLOCK[1]),
         });
         let allocator =

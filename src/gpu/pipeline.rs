@@ -311,6 +311,13 @@ fn layout(
             slots.push(Slot { binding, reads, writes });
         }
     }
+    let queried = slots.iter().find(|slot| slot.binding.kind == BindingKind::AccelerationStructure);
+    if let (Some(slot), None) = (queried, &gpu.rays) {
+        return Err(Error::Config {
+            what: format!("{name}: binding `{}`", slot.binding.name),
+            problem: super::acceleration::without(gpu),
+        });
+    }
     let push_bytes = points.iter().map(|p| p.push_bytes).max().unwrap_or(0);
     if push_bytes > gpu.info.max_push_bytes {
         return Err(Error::Limit {
@@ -368,6 +375,7 @@ pub(crate) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
         BindingKind::Sampled => vk::DescriptorType::SAMPLED_IMAGE,
         BindingKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
         BindingKind::Sampler => vk::DescriptorType::SAMPLER,
+        BindingKind::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
     }
 }
 

@@ -102,7 +102,7 @@ impl Recorder {
     /// One global memory barrier: every access of the kinds `before` recorded so far happens before every access of the kinds `after`
     /// recorded later.
     pub fn barrier(&mut self, before: &[Access], after: &[Access]) {
-        let union = |list| Access::union(list, self.gpu.graphics);
+        let union = |list| Access::union(list, self.gpu.graphics, self.gpu.rays.is_some());
         let ((src_stage, src), (dst_stage, dst)) = (union(before), union(after));
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(src_stage)

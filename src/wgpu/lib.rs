@@ -155,6 +155,7 @@ pub unsafe fn adopt(device: &wgpu::Device) -> Result<Gpu> {
         device: hal.raw_device().clone(),
         queue_family: hal.queue_family_index(),
         compute_only: false,
+        ray_queries: false,
         queue: Some(hal.raw_queue()),
     };
     // SAFETY: the handles belong together, and the caller promises the rest.

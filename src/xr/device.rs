@@ -58,6 +58,7 @@ impl Device {
             device: self.raw.clone(),
             queue_family: self.family,
             compute_only: false,
+            ray_queries: false,
             queue: Some(self.queue),
         }
     }

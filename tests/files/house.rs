@@ -648,7 +648,7 @@ fn a_use_of_something_below_is_caught_however_it_is_written() {
 // ------------------------------------------------------------------------------------------------------------- kernels
 
 /// Kernels that compute nothing that has an answer of its own, so that there is no twin to hold them to.
-const WITHOUT_TWIN: [(&str, &str); 10] = [
+const WITHOUT_TWIN: [(&str, &str); 11] = [
     ("labels", "copies features; the test has which bricks they change in"),
     ("mask", "copies opacities of a feature; the test has which, where"),
     ("filter", "asks a device what its filter does; the answer is in the comparison"),
@@ -657,6 +657,7 @@ const WITHOUT_TWIN: [(&str, &str); 10] = [
     ("present", "copies texels; the test has what each format makes of them"),
     ("scene_depth", "inverts a view's depth; the test has a sphere that it traces"),
     ("volumes", "draws what `gather` looks up, whose twin is its own; the test compares the two"),
+    ("trace_queries", "finds the rays of `trace`, whose twin is its own; the test compares the two"),
     ("compare", "counts differing bits of two volumes; tests plant differences and count them"),
     ("consistency", "reads what each eye reads; tests compare it with the volume itself"),
 ];

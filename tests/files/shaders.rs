@@ -2,7 +2,7 @@
 
 use cao_compile::{self as compile, Bounds, Kernel, Options, Source, What};
 use cao_kernels as shaders;
-use cao_reflect::{Shader, Stage};
+use cao_reflect::{BindingKind, Shader, Stage};
 use std::{fs, path::Path, process::Command};
 
 const UNCHECKED: Options = Options { bounds: Bounds::Unchecked, debug: false };
@@ -498,4 +498,32 @@ fn what_the_host_side_cannot_serve_is_refused_by_name() {
         let message = refused(wgsl);
         assert!(message.contains(word), "{message}");
     }
+}
+
+/// Vulkan wants 1.4 of them, and naga would write any version.
+#[test]
+fn modules_that_query_rays_are_of_spirv_1_4() {
+    let kernel = |head: &str, body: &str| {
+        let text = format!(
+            "{head}
+             struct Out {{ kind: u32 }}
+             @group(0) @binding(1) var<storage, read_write> out: Out;
+             @compute @workgroup_size(1) fn main() {{ {body} }}"
+        );
+        compile_text(&text).unwrap().shader
+    };
+    let queries = kernel(
+        "enable wgpu_ray_query;
+         @group(0) @binding(0) var world: acceleration_structure;",
+        "var query: ray_query;
+         rayQueryInitialize(&query, world, RayDesc(0u, 0xffu, 0.0, 1.0, vec3f(0.0), vec3f(1.0)));
+         while rayQueryProceed(&query) {}
+         out.kind = rayQueryGetCommittedIntersection(&query).kind;",
+    );
+    assert_valid(&queries, "ray queries");
+    assert_eq!(queries.spirv[1], 0x1_0400);
+    let world = &queries.bindings[0];
+    assert_eq!((world.name, world.kind), ("world", BindingKind::AccelerationStructure));
+    assert!(world.reads && !world.writes && world.min_bytes == 0);
+    assert_eq!(kernel("", "out.kind = 0u;").spirv[1], 0x1_0300);
 }

@@ -53,6 +53,7 @@ mod ssao;
 mod sums;
 mod tiles;
 mod trace;
+mod trace_queries;
 mod upsample;
 mod vicinity;
 mod volumes;

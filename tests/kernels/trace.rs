@@ -27,7 +27,7 @@ fn rays_give_what_the_twin_integrates() {
     let (surfaces, geometry) = (&pixels.surfaces, &pixels.geometry);
     let on = On { gpu: &gpu, geometry, surfaces, delta_mm: DELTA };
     let traced_by = |rays: u32| {
-        let method = ByRays::new(&gpu, rays).unwrap();
+        let method = ByRays::walks(&gpu, rays).unwrap();
         for part in 0..method.parts(&on) {
             run(&gpu, |rec| {
                 rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);

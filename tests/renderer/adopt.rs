@@ -2,6 +2,8 @@
 
 use crate::host::Host;
 use ash::vk;
+use cao::mesh::ambient::ByRays;
+use cao::mesh_renderer::MeshRenderer;
 use cao::renderer::{Renderer, Target, Targets};
 use cao_gpu::Access::*;
 use cao_gpu::Error;
@@ -12,7 +14,8 @@ use cao_model::settings::Setup;
 use cao_model::transfer::TransferFunction;
 use cao_model::view::StereoRig;
 use cao_testing::wgsl::{bind, compile};
-use cao_testing::{methods, renderer_of};
+use cao_testing::worlds::{corner, corner_eyes};
+use cao_testing::{close, methods, open, renderer_of};
 
 const FIRST: Stage = Stage::new("first", Phase::Ambient);
 const SECOND: Stage = Stage::new("second", Phase::Draw);
@@ -227,4 +230,39 @@ fn a_device_that_lacks_a_call_is_refused_by_its_name() {
     for word in ["VK_KHR_push_descriptor", "dynamicRendering", "barriers", "R16_UNORM", "without"] {
         assert!(words.contains(word), "{words}");
     }
+}
+
+/// Ray queries of a host's device are used where it says that there are some, and its word is checked as far as anybody can.
+#[test]
+fn ray_queries_of_a_host_are_taken_at_its_word() {
+    let host = Host::new();
+    let refused = host.adopted_for_ray_queries().map(drop).unwrap_err().to_string();
+    assert!(refused.contains("feature::RAY_QUERIES") && refused.contains("without ray_queries"), "{refused}");
+    let gpu = host.adopted(None);
+    assert!(!gpu.ray_queries() && !gpu.on_trust().concat().contains("rayQuery"));
+    drop(gpu);
+    host.destroy();
+    let ours = open();
+    if !ours.ray_queries() {
+        eprintln!("skipped: this device has no ray queries");
+        return close(ours);
+    }
+    close(ours);
+    let host = Host::with_ray_queries();
+    let gpu = host.adopted_for_ray_queries().unwrap();
+    assert!(gpu.ray_queries() && gpu.on_trust().concat().contains("rayQuery"));
+    let world = corner();
+    let [walks, queries] = [ByRays::walks(&gpu, 8), ByRays::queries(&gpu, 8)].map(|method| {
+        let mut renderer = MeshRenderer::with(&gpu, &world, Box::new(method.unwrap()), 40.0).unwrap();
+        renderer.draw(&corner_eyes([16, 12]), &Look::default(), [16, 12], None, &mut |_| ()).unwrap();
+        renderer.accessibility().unwrap()
+    });
+    assert!(walks.iter().any(|value| *value < 1.0));
+    let apart = walks.iter().zip(&queries).filter(|(a, b)| (**a - **b).abs() > 1e-5).count();
+    assert!(
+        apart * 100 <= walks.len(),
+        "{apart} pixels; tests/kernels/trace_queries.rs says why there may be any"
+    );
+    drop(gpu);
+    host.destroy();
 }

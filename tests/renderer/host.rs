@@ -1,7 +1,7 @@
 //! A program with a Vulkan of its own, as small as one can be.
 
 use ash::vk;
-use cao_gpu::feature::BEFORE_1_3;
+use cao_gpu::feature::{BEFORE_1_3, RAY_QUERIES};
 use cao_gpu::{Adopted, Gpu};
 use std::ffi::{CStr, c_void};
 use std::sync::Mutex;
@@ -44,6 +44,15 @@ impl Host {
 
     /// The same, and a device without an extension, its feature, and those that need it.
     pub fn without(version: u32, extension: Option<&CStr>) -> Self {
+        Self::made(version, extension, false)
+    }
+
+    /// With what ray queries need, which its device has.
+    pub fn with_ray_queries() -> Self {
+        Self::made(vk::API_VERSION_1_3, None, true)
+    }
+
+    fn made(version: u32, extension: Option<&CStr>, ray_queries: bool) -> Self {
         // SAFETY: the calls follow Vulkan's rules; everything passed lives during its call.
         unsafe {
             let entry = ash::Entry::load().unwrap();
@@ -88,6 +97,7 @@ impl Host {
                 .chain(before)
                 .copied()
                 .chain(timeline)
+                .chain(if ray_queries { RAY_QUERIES.iter().copied() } else { [].iter().copied() })
                 .filter(|name| Some(*name) != extension)
                 .map(CStr::as_ptr)
                 .collect();
@@ -98,6 +108,14 @@ impl Host {
                 Some(_) => vk::PhysicalDeviceFeatures2::default(),
             }
             .push_next(&mut semaphores);
+            let mut structures =
+                vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+            let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+            let mut addresses =
+                vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+            if ray_queries {
+                chain = chain.push_next(&mut structures).push_next(&mut queries).push_next(&mut addresses);
+            }
             let create = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
                 .enabled_extension_names(&extensions)
@@ -117,12 +135,13 @@ impl Host {
 
     /// The same, for compute alone if asked.
     pub fn adopted_for(&self, queue: Option<vk::Queue>, compute_only: bool) -> Gpu {
-        self.adopt(queue, compute_only).unwrap()
+        self.adopt(queue, compute_only, false).unwrap()
     }
 
-    fn adopt(&self, queue: Option<vk::Queue>, compute_only: bool) -> cao_gpu::Result<Gpu> {
+    fn adopt(&self, queue: Option<vk::Queue>, compute_only: bool, ray_queries: bool) -> cao_gpu::Result<Gpu> {
         let adopted = Adopted {
             compute_only,
+            ray_queries,
             entry: self.entry.clone(),
             instance: self.instance.clone(),
             physical_device: self.physical,
@@ -136,7 +155,12 @@ impl Host {
 
     /// Whether its device is accepted.
     pub fn try_adopted(&self) -> cao_gpu::Result<Gpu> {
-        self.adopt(None, false)
+        self.adopt(None, false, false)
+    }
+
+    /// Its device and its queue, said to be made for ray queries.
+    pub fn adopted_for_ray_queries(&self) -> cao_gpu::Result<Gpu> {
+        self.adopt(Some(self.queue), false, true)
     }
 
     /// Its device.

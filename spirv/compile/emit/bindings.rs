@@ -66,6 +66,7 @@ fn takes(binding: &Binding) -> &'static str {
     match (binding.kind, binding.image.map(|image| image.view)) {
         (BindingKind::Uniform | BindingKind::Storage, _) => "&'a crate::gpu::Buffer",
         (BindingKind::Sampler, _) => "&'a crate::gpu::Sampler",
+        (BindingKind::AccelerationStructure, _) => "&'a crate::gpu::AccelerationStructure",
         // Of an image of several layers, it takes one.
         (_, Some(ViewDim::D2)) => "crate::gpu::Flat<'a>",
         _ => "&'a crate::gpu::Image",

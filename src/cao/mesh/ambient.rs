@@ -1,13 +1,14 @@
 //! The seam of methods whose values belong to pixels, and those that read the triangles of the world.
 
-use crate::Result;
 use crate::mesh::gather::{Blocks, Gather, Scene};
 use crate::mesh::geometry::Geometry;
 use crate::mesh::surfaces::{Surfaces, VolumeTree};
 use crate::mesh::trace::{Rays, Trace};
+use crate::mesh::trace_queries::TraceQueries;
 use crate::mesh::upsample::Upsample;
 use crate::stages;
-use cao_gpu::{Access, Buffer, DeviceKind, Gpu, Recorder};
+use crate::{Error, Result};
+use cao_gpu::{AccelerationStructure, Access, Buffer, DeviceKind, Gpu, Recorder};
 
 /// Gives each pixel the light that reaches it.
 pub trait PixelAmbient {
@@ -41,10 +42,17 @@ pub struct Pixels<'a> {
     pub delta_mm: f32,
 }
 
-/// Rays, [`Trace`].
+/// Rays: [`Trace`], or [`TraceQueries`] where the device has ray queries in hardware.
 pub struct ByRays {
-    trace: Trace,
+    way: Way,
     rays: u32,
+}
+
+/// How rays find what they hit.
+enum Way {
+    Walks(Trace),
+    /// With the structure of the triangles that were prepared for.
+    Queries(TraceQueries, Option<(Buffer, AccelerationStructure)>),
 }
 
 /// Rays times pixels of a part: some hundredth of a second of a software driver at each of ten thousand triangles' depth of tree.
@@ -59,9 +67,27 @@ fn scaled(gpu: &Gpu, of_a_part: u32) -> u32 {
 }
 
 impl ByRays {
-    /// So many a pixel.
+    /// So many a pixel, the faster way: by queries where a device has them, but for software drivers, whose queries are the slower
+    /// (`docs/meshes.md`).
     pub fn new(gpu: &Gpu, rays: u32) -> Result<Self> {
-        Ok(Self { trace: Trace::new(gpu)?, rays })
+        if gpu.ray_queries() && gpu.info().kind != DeviceKind::Cpu {
+            Self::queries(gpu, rays)
+        } else {
+            Self::walks(gpu, rays)
+        }
+    }
+
+    /// So many a pixel, by walks through the tree, which every device can.
+    pub fn walks(gpu: &Gpu, rays: u32) -> Result<Self> {
+        Ok(Self { way: Way::Walks(Trace::new(gpu)?), rays })
+    }
+
+    /// So many a pixel, by ray queries.
+    ///
+    /// # Errors
+    /// A device without ([`Gpu::ray_queries`]).
+    pub fn queries(gpu: &Gpu, rays: u32) -> Result<Self> {
+        Ok(Self { way: Way::Queries(TraceQueries::new(gpu)?, None), rays })
     }
 
     fn of_a_part(on: &Pixels) -> u32 {
@@ -71,7 +97,12 @@ impl ByRays {
 }
 
 impl PixelAmbient for ByRays {
-    fn prepare(&mut self, _: &Pixels) -> Result<()> {
+    fn prepare(&mut self, on: &Pixels) -> Result<()> {
+        let Way::Queries(_, made) = &mut self.way else { return Ok(()) };
+        let triangles = &on.surfaces.triangles;
+        if !made.as_ref().is_some_and(|(of, _)| of.is(triangles)) {
+            *made = Some((triangles.clone(), on.surfaces.structure(on.gpu)?));
+        }
         Ok(())
     }
 
@@ -82,10 +113,21 @@ impl PixelAmbient for ByRays {
     fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
         let some = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
+        let rays = Rays { some, all: self.rays };
         rec.stage(stages::TRACE)?;
-        self.trace.record(rec, surfaces, geometry, delta_mm, Rays { some, all: self.rays }, accessibility)?;
+        match &self.way {
+            Way::Walks(trace) => trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?,
+            Way::Queries(trace, Some((of, world))) if of.is(&surfaces.triangles) => {
+                trace.record(rec, (surfaces, world), geometry, delta_mm, rays, accessibility)?;
+            }
+            Way::Queries(..) => return Err(unprepared()),
+        }
         Ok(rec.end_stage()?)
     }
+}
+
+fn unprepared() -> Error {
+    Error::refused("ambient occlusion of pixels", "is not prepared for these surfaces; call prepare first")
 }
 
 /// Ambient occlusion volumes, gathered: of all pixels, or of some with a joint bilateral mean between.
@@ -137,7 +179,7 @@ impl PixelAmbient for ByVolumes {
 
     fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
         let Some((volumes, blocks)) = &self.made else {
-            return Err(crate::Error::refused("ambient occlusion of pixels", "is not prepared"));
+            return Err(unprepared());
         };
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
         let scene = Scene { geometry, surfaces, volumes, delta_mm };

@@ -8,5 +8,6 @@ pub mod light;
 pub mod shares;
 pub mod surfaces;
 pub mod trace;
+pub mod trace_queries;
 pub mod upsample;
 pub mod volumes;

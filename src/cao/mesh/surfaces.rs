@@ -9,7 +9,7 @@ use crate::host::device_buffer;
 use crate::mesh::shares::Shares;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use cao_gpu::{Access, Buffer, Gpu};
+use cao_gpu::{AccelerationStructure, Access, Buffer, Corners, Gpu};
 use cao_kernels::gather::CLAMP;
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
@@ -18,6 +18,7 @@ use cao_model::mesh::bounds_of;
 use cao_model::settings::MapSettings;
 use cao_model::surface::{Triangle, World};
 use glam::Vec3;
+use std::mem::offset_of;
 
 /// A world's triangles on the device.
 pub struct Surfaces {
@@ -41,6 +42,10 @@ pub struct Surfaces {
     pub two_sided: Vec<bool>,
     nodes: Vec<Node>,
     share_out: Shares,
+    /// Some triangles have masks.
+    masked: bool,
+    /// There are clips.
+    clipped: bool,
     /// Half the diagonal of a box about the origin that holds them all.
     half_mm: f32,
 }
@@ -100,6 +105,8 @@ impl Surfaces {
             clips,
             half_mm,
             share_out: Shares::new(gpu)?,
+            masked: ordered.iter().any(|t| world.materials[t.material as usize].cutoff.is_some()),
+            clipped: false,
             tree: device_buffer(gpu, "tree", bytemuck::cast_slice(&packed(&bvh.nodes)))?,
             triangles: device_buffer(gpu, "triangles", bytemuck::cast_slice(&triangles))?,
             looks: device_buffer(gpu, "looks", bytemuck::cast_slice(&looks))?,
@@ -127,7 +134,26 @@ impl Surfaces {
         self.share_out.record(&mut rec, &self.triangles, &planned, &self.shares)?;
         rec.submit_and_wait()?;
         self.clips = planned;
+        self.clipped = !clips.is_empty();
         Ok(())
+    }
+
+    /// Neither masks nor clips take anything of the triangles.
+    pub fn whole(&self) -> bool {
+        !self.masked && !self.clipped
+    }
+
+    /// The triangles for ray queries, in their order; whatever the clips are. Uses the device's queue and waits for it.
+    ///
+    /// # Errors
+    /// A device without ray queries, or without memory.
+    pub fn structure(&self, gpu: &Gpu) -> Result<AccelerationStructure> {
+        let corners = Corners {
+            buffer: &self.triangles,
+            stride: offset_of!(kernel::WorldTriangle, b) as u64,
+            triangles: self.ordered.len() as u32,
+        };
+        Ok(gpu.acceleration_structure("world", corners)?)
     }
 
     /// The tree of what each triangle may occlude within `delta_mm`; with corners `clamped` as printed. Uses the device's queue and waits for it.

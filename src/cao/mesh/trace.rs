@@ -24,6 +24,34 @@ pub struct Rays {
     pub all: u32,
 }
 
+impl Rays {
+    /// What a kernel takes of them. `whole`: neither masks nor clips take any of the triangles.
+    pub(super) fn params(
+        self,
+        geometry: &Geometry,
+        delta_mm: f32,
+        whole: bool,
+    ) -> Result<kernel::TraceParams> {
+        let Self { some, all } = self;
+        if !(delta_mm.is_finite() && delta_mm > 0.0) {
+            return Err(Error::refused("delta_mm", format!("{delta_mm}; expected a length > 0 mm")));
+        }
+        if some.is_empty() || some.end > all {
+            return Err(Error::refused("rays", format!("{some:?} of {all}; expected some, within all")));
+        }
+        let size = geometry.size();
+        Ok(kernel::TraceParams {
+            size,
+            pixels: size[0] * size[1] * geometry.views() as u32,
+            first_ray: some.start,
+            rays: some.len() as u32,
+            all_rays: all,
+            delta: delta_mm,
+            whole: u32::from(whole),
+        })
+    }
+}
+
 impl Trace {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
@@ -41,26 +69,10 @@ impl Trace {
         surfaces: &Surfaces,
         geometry: &Geometry,
         delta_mm: f32,
-        Rays { some, all }: Rays,
+        rays: Rays,
         accessibility: &Buffer,
     ) -> Result<()> {
-        if !(delta_mm.is_finite() && delta_mm > 0.0) {
-            return Err(Error::refused("delta_mm", format!("{delta_mm}; expected a length > 0 mm")));
-        }
-        if some.is_empty() || some.end > all {
-            return Err(Error::refused("rays", format!("{some:?} of {all}; expected some, within all")));
-        }
-        let size = geometry.size();
-        let pixels = size[0] * size[1] * geometry.views() as u32;
-        let params = kernel::TraceParams {
-            size,
-            pixels,
-            first_ray: some.start,
-            rays: some.len() as u32,
-            all_rays: all,
-            delta: delta_mm,
-            pad: Default::default(),
-        };
+        let params = rays.params(geometry, delta_mm, surfaces.whole())?;
         let binds = kernel::MainBindings {
             eyes: &geometry.eyes,
             tree: &surfaces.tree,
@@ -73,7 +85,7 @@ impl Trace {
             geometry: &geometry.pixels,
             accessibility,
         };
-        let groups = row_of_groups(pixels.div_ceil(kernel::MAIN_WORKGROUP[0]));
+        let groups = row_of_groups(params.pixels.div_ceil(kernel::MAIN_WORKGROUP[0]));
         rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
         Ok(())
     }

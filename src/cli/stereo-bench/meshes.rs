@@ -1,8 +1,9 @@
-//! The bars of ambient occlusion volumes of meshes (AOV §6): a level of 10⁵ triangles at 1280 × 720, one view; small and not judged on a software driver.
+//! The bars of ambient occlusion volumes of meshes (AOV §6): a level of 10⁵ triangles at 1280 × 720, one view; small and not judged on a software driver. Beside
+//! them rays both ways, without a bar.
 
 use super::bars::{Bar, RUNS, Row, Rows};
 use anyhow::Result;
-use cao::mesh::ambient::{ByVolumes, PixelAmbient};
+use cao::mesh::ambient::{ByRays, ByVolumes, PixelAmbient};
 use cao::mesh::volumes::Volumes;
 use cao::mesh_renderer::MeshRenderer;
 use cao_gpu::{Gpu, Phase};
@@ -15,6 +16,9 @@ use cao_model::surface::World;
 const FULL_MS: f64 = 10.0;
 const SPARSE_MS: f64 = 2.0;
 
+/// Rays a pixel.
+const RAYS: u32 = 64;
+
 /// All of them.
 pub fn bars(gpu: &Gpu, software: bool, rows: &mut Rows) -> Result<()> {
     let scene = BuiltScene::parse("level")?;
@@ -22,15 +26,20 @@ pub fn bars(gpu: &Gpu, software: bool, rows: &mut Rows) -> Result<()> {
     let world = World::new(&(scene.make)(detail))?;
     let [left, _] = scene.eye.views(size[0] as f32 / size[1] as f32, 1.0, 1e5)?;
     type Make = fn(&Gpu) -> cao::Result<Box<dyn PixelAmbient>>;
+    let (aov, rays) = (FACTORS[0] * scene.delta_mm, scene.delta_mm);
     // Drawn, as the paper has it, is there to be compared with.
-    let ways: [(&str, Make, Bar); 4] = [
-        ("AOV, gathered", |gpu| Ok(Box::new(ByVolumes::new(gpu, 1)?)), Bar::AtMost(FULL_MS)),
-        ("AOV, drawn, static", |gpu| Ok(Box::new(Volumes::new(gpu, true)?)), Bar::None),
-        ("AOV, drawn, dynamic", |gpu| Ok(Box::new(Volumes::new(gpu, false)?)), Bar::None),
-        ("AOV, 1/25 5x5", |gpu| Ok(Box::new(ByVolumes::new(gpu, 5)?)), Bar::AtMost(SPARSE_MS)),
+    let mut ways: Vec<(String, Make, f32, Bar)> = vec![
+        ("AOV, gathered".into(), |gpu| Ok(Box::new(ByVolumes::new(gpu, 1)?)), aov, Bar::AtMost(FULL_MS)),
+        ("AOV, drawn, static".into(), |gpu| Ok(Box::new(Volumes::new(gpu, true)?)), aov, Bar::None),
+        ("AOV, drawn, dynamic".into(), |gpu| Ok(Box::new(Volumes::new(gpu, false)?)), aov, Bar::None),
+        ("AOV, 1/25 5x5".into(), |gpu| Ok(Box::new(ByVolumes::new(gpu, 5)?)), aov, Bar::AtMost(SPARSE_MS)),
+        (format!("rays, {RAYS}, plain"), |gpu| Ok(Box::new(ByRays::walks(gpu, RAYS)?)), rays, Bar::None),
     ];
-    for (what, make, bar) in ways {
-        let delta_mm = FACTORS[0] * scene.delta_mm;
+    if gpu.ray_queries() {
+        let queries: Make = |gpu| Ok(Box::new(ByRays::queries(gpu, RAYS)?));
+        ways.push((format!("rays, {RAYS}, ray queries"), queries, rays, Bar::None));
+    }
+    for (what, make, delta_mm, bar) in ways {
         let mut renderer = MeshRenderer::with(gpu, &world, make(gpu)?, delta_mm)?;
         let mut found = Vec::new();
         for _ in 0..RUNS + 1 {
@@ -41,7 +50,7 @@ pub fn bars(gpu: &Gpu, software: bool, rows: &mut Rows) -> Result<()> {
         found.remove(0);
         rows.push(Row {
             place: format!("{}, {} triangles, {} x {}", scene.name, world.triangles.len(), size[0], size[1]),
-            what: what.into(),
+            what,
             bar: if software { Bar::None } else { bar },
             unit: "ms",
             found,
