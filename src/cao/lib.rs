@@ -80,6 +80,7 @@ pub mod mesh;
 pub mod mesh_renderer;
 pub mod method;
 pub mod network;
+pub mod picture_occlusion;
 pub mod pyramid;
 pub mod rays;
 pub mod renderer;

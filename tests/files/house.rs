@@ -345,6 +345,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &["draw", "drive", "error", "host", "image_space", "mesh", "renderer", "stages"],
     ),
     ("src/cao/image_space/", &["error", "draw", "mesh", "stages"]),
+    ("src/cao/picture_occlusion.rs", &["draw", "error", "host", "image_space", "mesh", "renderer", "stages"]),
     ("src/cao/subject.rs", &["error", "stages", "drive", "field", "clip"]),
     ("src/cao/ambient.rs", &["error", "drive", "field", "subject"]),
     ("src/cao/build.rs", &["error", "stages", "ambient"]),

@@ -13,6 +13,5 @@ pub mod crytek;
 pub mod first_hit;
 pub mod hbao;
 pub mod method;
-pub mod of_picture;
 pub mod shade;
 pub mod volumetric;

@@ -4,7 +4,7 @@ use crate::args::{self, Global, Render, usage};
 use crate::{budget, meshes};
 use anyhow::Result;
 use cao::image_space::method::image_method;
-use cao::image_space::of_picture::OfPicture;
+use cao::picture_occlusion::PictureOcclusion;
 use cao::renderer::{Bands, COLOUR, Renderer, StereoImage};
 use cao_cli::output::{Out, Progress, check_validation, open_gpu};
 use cao_cli::targets::Targets;
@@ -108,7 +108,7 @@ pub fn run(global: &Global, args: &Render, matches: &ArgMatches) -> Result<ExitC
         }
         if let Some(method) = image_space.and_then(|(pixels, delta_mm)| image_method(&pixels, delta_mm)) {
             // Its values depend on what else the picture shows: no bands.
-            let (image, drawn) = OfPicture::draw(&gpu, &renderer, &views, &look, size, &method)?;
+            let (image, drawn) = PictureOcclusion::draw(&gpu, &renderer, &views, &look, size, &method)?;
             pictures.add(&image)?;
             timings.extend(drawn);
         }

@@ -4,7 +4,7 @@ use super::image_space::{IMAGE_SPACE, Passes};
 use super::{Arena, surface_look};
 use crate::Result;
 use cao::draw::picture::Picture;
-use cao::image_space::of_picture::OfPicture;
+use cao::picture_occlusion::PictureOcclusion;
 use cao::renderer::Renderer;
 use cao_gpu::Timings;
 use cao_model::image_space::ImageMethod;
@@ -13,14 +13,18 @@ use cao_model::image_space::ImageMethod;
 pub struct FirstHits {
     place: usize,
     picture: Picture,
-    shade: OfPicture,
+    shade: PictureOcclusion,
 }
 
 impl FirstHits {
     /// The method of this place in [`ImageMethod::all`].
     pub fn new(Arena { gpu, size, views, .. }: Arena, place: usize) -> Result<Self> {
         let views = views.len();
-        Ok(Self { place, picture: Picture::new(gpu, size, views)?, shade: OfPicture::new(gpu, size, views)? })
+        Ok(Self {
+            place,
+            picture: Picture::new(gpu, size, views)?,
+            shade: PictureOcclusion::new(gpu, size, views)?,
+        })
     }
 }
 

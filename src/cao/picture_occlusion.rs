@@ -2,11 +2,11 @@
 //!
 //! 28 bytes a pixel and view beside the picture.
 
-use super::first_hit::FirstHit;
-use super::shade::ImageSpace;
 use crate::Result;
 use crate::draw::picture::Picture;
 use crate::host::read_buffer;
+use crate::image_space::first_hit::FirstHit;
+use crate::image_space::shade::ImageSpace;
 use crate::mesh::geometry::Geometry;
 use crate::renderer::{Renderer, StereoImage};
 use crate::stages;
@@ -16,7 +16,7 @@ use cao_model::look::{Look, Shading};
 use cao_model::view::View;
 
 /// Kernels, and memory for pictures of one size.
-pub struct OfPicture {
+pub struct PictureOcclusion {
     geometry: Geometry,
     first_hit: FirstHit,
     shade: ImageSpace,
@@ -24,7 +24,7 @@ pub struct OfPicture {
     accessibility: Buffer,
 }
 
-impl OfPicture {
+impl PictureOcclusion {
     /// For so many views of `size` pixels.
     ///
     /// # Errors
