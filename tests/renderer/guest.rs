@@ -49,8 +49,9 @@ fn without_memory_what_was_there_stays_in_use() {
         let size = size_mm(&grid_of(&scene.volume));
         scene.clips = vec![random_clip(&mut random, &Shape::Mesh(concave()), size)];
 
-        // Nothing stays of a renderer that could not be made.
-        let mut failed = 0;
+        // Nothing stays of a renderer that could not be made. One that could holds the pipelines, so that none is compiled for each.
+        let made = scene.renderer(&gpu);
+        let (held, mut failed) = (gpu.memory_report(), 0);
         loop {
             gpu.fail_after(Some(failed));
             let made = renderer_of(&gpu, &scene.volume, scene.transfer.clone(), scene.setup, COLOUR);
@@ -59,10 +60,12 @@ fn without_memory_what_was_there_stays_in_use() {
                 Ok(_) => break,
                 Err(error) => assert!(error.to_string().contains("fail_after"), "{error}"),
             }
-            assert_eq!(gpu.memory_report(), []);
+            assert_eq!(gpu.memory_report(), held);
             failed += 1;
         }
         assert!(failed > 10, "{failed}");
+        drop(made);
+        assert_eq!(gpu.memory_report(), []);
 
         let mut renderer = scene.renderer(&gpu);
         let as_before = |scene: &Scene, what: &str| {
