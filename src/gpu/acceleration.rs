@@ -1,5 +1,5 @@
 //! Triangles as a device keeps them to find what rays hit (VK_KHR_acceleration_structure): a bottom level of all triangles, a top level of
-//! one instance of it, each in a buffer of its own, by which the hazard checker knows it. Some 50 to 150 bytes a triangle, as the driver likes.
+//! one instance of it, each in a buffer of its own, by which the hazard checker knows it. lavapipe takes 104 bytes a triangle.
 
 use super::{
     Access, Buffer, BufferUse, Gpu, Recorder,

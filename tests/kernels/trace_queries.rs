@@ -1,7 +1,7 @@
 //! The kernel `trace_queries` against `trace`, whose twin is the truth of both: the same rays, found by the device.
 
 use cao::mesh::ambient::{ByRays, PixelAmbient, Pixels as On};
-use cao_gpu::{Access, Gpu, OpenOptions};
+use cao_gpu::{Access, DeviceKind, Gpu, OpenOptions};
 use cao_model::clip::Clip;
 use cao_model::surface::World;
 use cao_testing::worlds::{Pixels, clips, corner, corner_eyes, cuboid, floats, sheet, world_of};
@@ -116,8 +116,11 @@ fn queries_are_refused_by_name_where_there_are_none_or_nothing_was_prepared() {
         let accessibility = pixels.values(&gpu);
         let (surfaces, geometry) = (&pixels.surfaces, &pixels.geometry);
         let on = On { gpu: &gpu, geometry, surfaces, delta_mm: DELTA };
-        let method = ByRays::queries(&gpu, RAYS).unwrap();
         let mut rec = gpu.recorder("test").unwrap();
+        // Hardware takes them unasked, a software driver does not, and walks need no preparation.
+        let chosen = ByRays::new(&gpu, RAYS).unwrap().record(&mut rec, &on, 0, &accessibility);
+        assert_eq!(chosen.is_ok(), gpu.info().kind == DeviceKind::Cpu);
+        let method = ByRays::queries(&gpu, RAYS).unwrap();
         let refused = method.record(&mut rec, &on, 0, &accessibility).unwrap_err().to_string();
         assert!(refused.contains("call prepare"), "{refused}");
     }

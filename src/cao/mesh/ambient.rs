@@ -114,10 +114,13 @@ impl PixelAmbient for ByRays {
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
         let some = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
         let rays = Rays { some, all: self.rays };
-        rec.stage(stages::TRACE)?;
         match &self.way {
-            Way::Walks(trace) => trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?,
+            Way::Walks(trace) => {
+                rec.stage(stages::TRACE)?;
+                trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
+            }
             Way::Queries(trace, Some((of, world))) if of.is(&surfaces.triangles) => {
+                rec.stage(stages::TRACE)?;
                 trace.record(rec, (surfaces, world), geometry, delta_mm, rays, accessibility)?;
             }
             Way::Queries(..) => return Err(unprepared()),
