@@ -1,6 +1,6 @@
 //! Lengths are relative to the volume: the same scene in other units is the same picture.
 
-use cao::renderer::{COLOUR, StereoImage};
+use cao::renderer::{COLOUR, Renderer, StereoImage};
 use cao_formats::Picture;
 use cao_gpu::Gpu;
 use cao_measure::exactness::{Plan, verify};
@@ -15,8 +15,9 @@ use cao_model::view::{StereoRig, View};
 use cao_testing::*;
 use glam::Vec3;
 
-/// What a scene shows: ambient factors, opacities, both eyes as they frame the box, and as they frame what is visible.
-type Shown = (Vec<f32>, Vec<f32>, StereoImage<4>);
+/// What a scene shows: ambient factors, opacities, both eyes as they frame the box, and as they frame what is visible. Its renderer holds pipelines,
+/// so that those after it compile none.
+type Shown = (Vec<f32>, Vec<f32>, StereoImage<4>, Renderer);
 
 /// A scene with every length that there is, each times `unit`.
 fn shown(gpu: &Gpu, method: Method, unit: f32) -> Shown {
@@ -67,7 +68,7 @@ fn shown(gpu: &Gpu, method: Method, unit: f32) -> Shown {
     let views: [View; 4] = [eyes[0][0], eyes[0][1], eyes[1][0], eyes[1][1]];
     let look = Look { step_mm: Some(0.3 * unit), ..Look::default() };
     let (image, _) = renderer.draw(&views, &look, [40, 36]).unwrap();
-    (renderer.read_ambient().unwrap(), renderer.read_opacity().unwrap(), image)
+    (renderer.read_ambient().unwrap(), renderer.read_opacity().unwrap(), image, renderer)
 }
 
 /// All of them; of methods that have the lengths of another the first and the last.
@@ -83,7 +84,7 @@ fn every<T>(all: impl IntoIterator<Item = T>, method: Method) -> Vec<T> {
 fn a_scene_in_units_of_a_power_of_two_is_the_same_to_the_bit() {
     let gpu = open();
     for method in methods() {
-        let (ambient, opacity, image) = shown(&gpu, method, 1.0);
+        let (ambient, opacity, image, _held) = shown(&gpu, method, 1.0);
         // Means of neighbourhoods are nowhere as dark as rays are.
         let dark = if kinds().contains(&method) { 0.5 } else { 0.9 };
         assert!(ambient.iter().any(|a| *a < dark) && opacity.iter().any(|a| *a > 0.5), "{}", method.name());
@@ -109,7 +110,7 @@ fn a_scene_in_any_units_is_the_same_picture() {
         eyes.flat_map(|eye| eye.pixels).flatten().collect()
     };
     for method in methods() {
-        let (ambient, _, image) = shown(&gpu, method, 1.0);
+        let (ambient, _, image, _held) = shown(&gpu, method, 1.0);
         for unit in every([1.5e-9, 1e-6, 1e-3, 1e3, 1e6, 0.7e9], method) {
             let found = shown(&gpu, method, unit);
             let worst = found.0.iter().zip(&ambient).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -126,6 +127,8 @@ fn a_scene_in_any_units_is_the_same_picture() {
 #[test]
 fn clips_are_exact_in_any_units() {
     let gpu = open();
+    // Pipelines last from one to the next.
+    let mut held = None;
     for method in methods() {
         let poses = if kinds().contains(&method) { 5 } else { 2 };
         for unit in every([1e-9, 1e-6, 1e6], method) {
@@ -138,8 +141,10 @@ fn clips_are_exact_in_any_units() {
             let report = verify(&mut renderer, &plan, &mut |_| ()).unwrap();
             assert!(report.exact(), "{} {unit:e}: {:?} {:?}", method.name(), report.total(), report.stereo);
             assert!(report.affected() > 0.0);
+            held = Some(renderer);
         }
     }
+    drop(held);
     close(gpu);
 }
 
@@ -147,6 +152,7 @@ fn clips_are_exact_in_any_units() {
 #[test]
 fn limits_of_clips_are_relative_to_the_volume() {
     let gpu = open();
+    let mut held = None;
     for method in kinds() {
         for unit in [1.1e-9_f32, 1.0, 0.9e9] {
             let volume = builtin_box("engine", [16; 3], [f64::from(unit); 3]).unwrap();
@@ -184,7 +190,9 @@ fn limits_of_clips_are_relative_to_the_volume() {
             }
             // A half-space has no size.
             renderer.set_clips(&[Clip::remove(Shape::Plane), clip(&Shape::Plane, 1e-20, 0.1)]).unwrap();
+            held = Some(renderer);
         }
     }
+    drop(held);
     close(gpu);
 }
