@@ -2,9 +2,12 @@
 // falloff. Rays of a pixel are a sequence of low discrepancy (Roberts's R2), shifted by a hash of the pixel; some at a time.
 //
 //   AO = 1/N sum_i max(0, 1 - t_i / delta)
+//
+// `capped` is for worlds of which clips cut meshes that ask for caps, which occlude as well.
 
 #include "shared/geometry.wgsl"
 #include "shared/ray.wgsl"
+#include "shared/caps.wgsl"
 #include "shared/bricks.wgsl"
 #include "shared/hash.wgsl"
 #include "shared/accessibility.wgsl"
@@ -40,8 +43,7 @@ const TAU = 6.28318530718;
 const STEP_X = 3242174889u;
 const STEP_Y = 2447445414u;
 
-@compute @workgroup_size(64)
-fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+fn trace_pixel(group: vec3<u32>, local: u32, caps: bool) {
     let index = (group.y * GROUPS_PER_ROW + group.x) * 64u + local;
     if index >= params.pixels {
         return;
@@ -74,10 +76,24 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         let ring = sqrt(u);
         let direction = tangent * (ring * cos(angle)) + bitangent * (ring * sin(angle)) + normal * sqrt(1.0 - u);
         let hit = first_hit(origin, direction, 0.0, params.delta);
-        sum += 1.0 - hit.t / params.delta;
+        var t = hit.t;
+        if caps {
+            t = first_cap(origin, direction, 0.0, hit).t;
+        }
+        sum += 1.0 - t / params.delta;
     }
     if params.first_ray + params.rays == params.all_rays {
         sum = 1.0 - sum / f32(params.all_rays);
     }
     accessibility.pixel[index] = sum;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    trace_pixel(group, local, false);
+}
+
+@compute @workgroup_size(64)
+fn capped(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    trace_pixel(group, local, true);
 }

@@ -9,7 +9,7 @@ use crate::host::device_buffer;
 use crate::mesh::shares::Shares;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use cao_gpu::{Access, Buffer, Gpu};
+use cao_gpu::{Access, Buffer, Gpu, Pipeline, Shader};
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
 use cao_model::clip::Clip;
@@ -17,6 +17,7 @@ use cao_model::mesh::bounds_of;
 use cao_model::settings::MapSettings;
 use cao_model::surface::{Triangle, World};
 use glam::Vec3;
+use std::sync::OnceLock;
 
 /// A world's triangles on the device.
 pub struct Surfaces {
@@ -38,6 +39,10 @@ pub struct Surfaces {
     pub ordered: Vec<Triangle>,
     /// and whether their backs are surfaces too.
     pub two_sided: Vec<bool>,
+    /// Whether any mesh shows caps where it is cut.
+    capped: bool,
+    /// Whether there are clips.
+    clipped: bool,
     nodes: Vec<Node>,
     share_out: Shares,
     /// Half the diagonal of a box about the origin that holds them all.
@@ -66,10 +71,12 @@ impl Surfaces {
             ordered.iter().map(|t| world.materials[t.material as usize].two_sided).collect();
         let mut texels: Vec<u8> = Vec::new();
         let mut materials = Vec::new();
-        for material in &world.materials {
+        for (material, body) in world.materials.iter().zip(&world.instance_of) {
             let mut on_device = kernel::SurfaceMaterial {
                 colour: glam::Vec3::from(material.colour).extend(material.alpha).to_array(),
                 cutoff: material.cutoff.unwrap_or_default(),
+                cap: material.cap.unwrap_or_default(),
+                body: *body,
                 ..kernel::SurfaceMaterial::zeroed()
             };
             if let Some(texture) = &material.texture {
@@ -96,6 +103,8 @@ impl Surfaces {
             shares: device_buffer(gpu, "shares", bytemuck::cast_slice(&whole))?,
             clips,
             half_mm,
+            capped: world.materials.iter().any(|material| material.cap.is_some()),
+            clipped: false,
             share_out: Shares::new(gpu)?,
             tree: device_buffer(gpu, "tree", bytemuck::cast_slice(&packed(&bvh.nodes)))?,
             triangles: device_buffer(gpu, "triangles", bytemuck::cast_slice(&triangles))?,
@@ -124,7 +133,13 @@ impl Surfaces {
         self.share_out.record(&mut rec, &self.triangles, &planned, &self.shares)?;
         rec.submit_and_wait()?;
         self.clips = planned;
+        self.clipped = !clips.is_empty();
         Ok(())
+    }
+
+    /// Whether rays have to look for caps: clips cut meshes that ask for them.
+    pub fn caps(&self) -> bool {
+        self.capped && self.clipped
     }
 
     /// The tree of what each triangle may occlude within `delta_mm`. Uses the device's queue and waits for it.
@@ -146,6 +161,19 @@ impl Surfaces {
         let nodes = in_place.refit(&boxes);
         Ok(VolumeTree { tree: device_buffer(gpu, "tree of volumes", bytemuck::cast_slice(&packed(&nodes)))? })
     }
+}
+
+/// The pipeline `capped` of a kernel that has one for worlds with [caps](Surfaces::caps), which most do without.
+pub fn built<'a>(
+    gpu: &Gpu,
+    pipeline: &'a OnceLock<Pipeline>,
+    shader: &'static Shader,
+) -> Result<&'a Pipeline> {
+    if let Some(pipeline) = pipeline.get() {
+        return Ok(pipeline);
+    }
+    let built = gpu.compute(shader, "capped")?;
+    Ok(pipeline.get_or_init(|| built))
 }
 
 /// Corners that stick out of a volume farther than this, in deltas, make it a sliver's (AOV §5.2 clamps at 2, which cuts volumes where
@@ -206,6 +234,9 @@ fn on_device(triangle: &Triangle, world: &World) -> kernel::WorldTriangle {
     }
     if material.spared {
         kind |= kernel::SPARED;
+    }
+    if material.cap.is_some() {
+        kind |= kernel::CAPPED;
     }
     if is_sliver(triangle.corners) {
         kind |= kernel::SLIVER;
