@@ -158,7 +158,7 @@ fn first_cap(origin: vec3<f32>, direction: vec3<f32>, begin: f32, hit: Hit) -> C
         loop {
             var next = NOWHERE.x;
             var hides = false;
-            for (var c = 0u; c < clips.count; c++) {
+            for (var c = 0u; c < clips.count && t < hit.t; c++) {
                 let hidden = hidden_stretch(c, line, t);
                 if hidden.x <= t + doubt(line, t) {
                     t = hidden.y;

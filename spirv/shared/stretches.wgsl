@@ -125,10 +125,11 @@ fn within_layers(c: u32, line: Line, t: f32) -> vec2<f32> {
     while over.x < over.y && all(pixel >= vec2(0)) && all(pixel < vec2(resolution)) {
         let border = vec2<f32>(pixel) + select(vec2(0.0), vec2(1.0), d.xy > vec2(0.0));
         let to_border = select((border - p.xy) / d.xy, vec2(BEYOND), d.xy == vec2(0.0));
-        let out = min(min(to_border.x, to_border.y), over.y);
+        // At corners some are passed in no time.
+        let out = max(min(min(to_border.x, to_border.y), over.y), over.x);
         let at = clips.clip[c].layers_at + u32(pixel.y * resolution + pixel.x);
         // The first that is met in this pixel, and on through those that follow on one another.
-        var goes_on = true;
+        var goes_on = over.x < out;
         while goes_on {
             goes_on = false;
             var nearest = NOWHERE;
@@ -201,15 +202,13 @@ fn within(c: u32, line: Line, t: f32) -> vec2<f32> {
 fn hidden_stretch(c: u32, line: Line, t: f32) -> vec2<f32> {
     let keep = clips.clip[c].keep == 1u;
     var begin = t;
-    var found = vec2(0.0);
-    // What a kept shape hides is before, between and behind its stretches.
-    loop {
-        found = within(c, line, begin);
-        let ends = select(found.y, found.x, keep);
-        if ends > begin + doubt(line, begin) {
-            break;
+    while begin < line.end {
+        let found = within(c, line, begin);
+        // What a kept shape hides is before, between and behind its stretches.
+        if select(found.y, found.x, keep) > begin + doubt(line, begin) {
+            return select(found, vec2(begin, found.x), keep);
         }
         begin = found.y;
     }
-    return select(found, vec2(begin, found.x), keep);
+    return vec2(begin, NOWHERE.y);
 }

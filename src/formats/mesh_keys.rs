@@ -35,7 +35,7 @@ use serde::Deserialize;
 use toml::Value;
 
 use crate::keys::{existing, length, pose};
-use crate::toml_value::parse_colour;
+use crate::toml_value::{parse_colour, shown};
 use crate::{Error, Result, surface};
 use cao_model::clip::Pose;
 use cao_model::pixel_occlusion::{PixelMethod, PixelOcclusion};
@@ -185,7 +185,16 @@ impl MeshFile {
         let cap = match &self.cap {
             None | Some(Value::Boolean(false)) => Cap::None,
             Some(Value::Boolean(true)) => Cap::Own,
-            Some(colour) => Cap::Colour(parse_colour(&of("cap"), colour)?),
+            Some(colour) => {
+                let read = parse_colour(&of("cap"), colour);
+                let problem = || {
+                    format!(
+                        "{}: expected true, false, \"#rrggbb\" or [r, g, b] with numbers from 0 to 1",
+                        shown(colour)
+                    )
+                };
+                Cap::Colour(read.map_err(|_| Error::refused(&of("cap"), problem()))?)
+            }
         };
         if self.spared && cap != Cap::None {
             return Err(Error::refused(

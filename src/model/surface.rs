@@ -412,6 +412,41 @@ mod tests {
     }
 
     #[test]
+    fn caps_are_of_solids_as_a_whole() {
+        let cube = TriangleMesh::cuboid();
+        let with = |change: fn(&mut Surface)| {
+            let capped = Material { cap: Some([0.5; 3]), ..Material::default() };
+            let mut surface = Surface {
+                name: "cube".into(),
+                positions: cube.vertices.clone(),
+                triangles: cube.triangles.clone(),
+                material_of: vec![0; 12],
+                materials: vec![capped.clone(), capped],
+                ..Surface::default()
+            };
+            change(&mut surface);
+            surface
+        };
+        let place = |surface| Instance { surface: Arc::new(surface), pose: Pose::default() };
+        let world = World::new(&[place(with(|_| ())), place(square())]).unwrap();
+        assert_eq!(world.instance_of, [0, 0, 1]);
+        for (change, expected) in [
+            ((|s: &mut Surface| s.triangles[3] = [0, 1, 2]) as fn(&mut Surface), "does not enclose a solid"),
+            (
+                |s| s.triangles.iter_mut().for_each(|t| t.swap(0, 1)),
+                "inside out; in a mesh editor, flip its faces",
+            ),
+            (|s| s.materials[1].cap = None, "material \"default\" has another cap than the first one"),
+            (|s| s.materials[1].spared = true, "clips leave it whole, as it is spared"),
+        ] {
+            let message = refusal(with(change));
+            let named =
+                message.contains("mesh cube: cannot have caps: ") && message.contains("do without caps");
+            assert!(named && message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
     fn bad_surfaces_are_refused_by_name() {
         let with = |change: fn(&mut Surface)| {
             let mut surface = square();
