@@ -101,7 +101,6 @@ fn caps_occlude_as_the_twin_finds_them() {
             apart += u32::from((without - expected).abs() > 0.1);
         }
     }
-    println!("{sum} {bias} of {count}, {apart} apart");
     assert!(count > 150.0 && sum / count < FEWER, "mean difference {} of {count}", sum / count);
     assert!((bias / count).abs() < 0.3 * FEWER, "bias {}", bias / count);
     assert!(apart > 20, "without caps it is the same but for {apart} pixels");

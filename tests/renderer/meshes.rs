@@ -195,7 +195,6 @@ fn caps_occlude_rays_and_no_volumes() {
         pixels.iter().map(|i| f64::from(values[*i])).sum::<f64>() / pixels.len() as f64
     };
     let (rays, volumes) = (open_at(PixelMethod::Rays), open_at(PixelMethod::Aov));
-    println!("rays {rays}, volumes {volumes}");
     assert!((0.5..0.8).contains(&rays) && volumes > 0.95, "{rays} by rays, {volumes} by volumes");
     close(gpu);
 }

@@ -54,17 +54,17 @@ pub fn first_cap(
     let ways = [(low.as_dvec3() - origin) / direction, (high.as_dvec3() - origin) / direction];
     let near = ways[0].min(ways[1]).max_element().max(begin);
     let far = ways[0].max(ways[1]).min_element().min(end);
+    if near >= far {
+        return None;
+    }
     let step = STEP / direction.length();
     let hidden = |t: f64| clips.iter().position(|clip| hides(clip, origin + direction * t));
     let mut was = hidden(near);
     for i in 1.. {
-        let t = near + f64::from(i) * step;
-        if t >= far {
-            return None;
-        }
+        let t = (near + f64::from(i) * step).min(far);
         let is = hidden(t);
         if was.is_some() && is.is_none() {
-            let (mut before, mut behind) = (t - step, t);
+            let (mut before, mut behind) = (near + f64::from(i - 1) * step, t);
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (before + behind);
                 if hidden(middle).is_some() { before = middle } else { behind = middle }
@@ -72,6 +72,9 @@ pub fn first_cap(
             if let Some(triangle) = around(world, &faces, origin, direction, behind) {
                 return Some(Cap { t: behind, triangle, clip: hidden(before).expect("a clip hides it") });
             }
+        }
+        if t >= far {
+            return None;
         }
         was = is;
     }
