@@ -95,13 +95,17 @@ fn light_at(index: u32, eye: Eye, pixel: vec2<u32>, factor: vec3<f32>) -> vec3<f
     let at = unpack2x16unorm(hit.y);
     let look = looks.triangle[hit.x];
     let material = materials.material[u32(triangles.triangle[hit.x].b.w)];
-    let colour = material.colour.rgb * linear_of(texture_at(material, uv_at(look, at)).rgb);
     let own = geometry.pixel[index].xyz;
-    var normal = normalize(
-        normal_of(look.normal_a) * (1.0 - at.x - at.y) + normal_of(look.normal_b) * at.x + normal_of(look.normal_c) * at.y
-    );
-    // Of the side that is seen.
-    normal = select(normal, -normal, dot(normal, own) < 0.0);
+    var colour = material.cap;
+    var normal = own;
+    if hit.y != ON_CAP {
+        colour = material.colour.rgb * linear_of(texture_at(material, uv_at(look, at)).rgb);
+        normal = normalize(
+            normal_of(look.normal_a) * (1.0 - at.x - at.y) + normal_of(look.normal_b) * at.x + normal_of(look.normal_c) * at.y
+        );
+        // Of the side that is seen.
+        normal = select(normal, -normal, dot(normal, own) < 0.0);
+    }
     let light = vec3(params.light_x, params.light_y, params.light_z);
     let towards_eye = -normalize(direction_through(eye, params.size, vec2<f32>(pixel) + 0.5));
     let slope = max(dot(normal, light), 0.0);

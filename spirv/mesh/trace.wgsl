@@ -1,6 +1,8 @@
 // The truth (AOV section 6): how many rays of a pixel are hit, and how near, by walks through the tree of triangles.
+// `capped` is for worlds of which clips cut meshes that ask for caps, which occlude as well.
 
 #include "shared/ray.wgsl"
+#include "shared/caps.wgsl"
 #include "shared/cosine_rays.wgsl"
 
 @group(0) @binding(0) var<uniform> eyes: Eyes;
@@ -15,11 +17,20 @@
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 
-fn way_to_hit(origin: vec3<f32>, direction: vec3<f32>) -> f32 {
-    return first_hit(origin, direction, 0.0, params.delta).t;
+fn way_to_hit(origin: vec3<f32>, direction: vec3<f32>, caps: bool) -> f32 {
+    let hit = first_hit(origin, direction, 0.0, params.delta);
+    if caps {
+        return first_cap(origin, direction, 0.0, hit).t;
+    }
+    return hit.t;
 }
 
 @compute @workgroup_size(LANES)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    trace_pixel(group, local);
+    trace_pixel(group, local, false);
+}
+
+@compute @workgroup_size(LANES)
+fn capped(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    trace_pixel(group, local, true);
 }

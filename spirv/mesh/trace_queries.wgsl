@@ -20,7 +20,8 @@ enable wgpu_ray_query;
 @group(0) @binding(8) var<storage, read> clips: Clips;
 @group(0) @binding(9) var<storage, read> layers: Layers;
 
-fn way_to_hit(origin: vec3<f32>, direction: vec3<f32>) -> f32 {
+// Where there are caps, rays walk.
+fn way_to_hit(origin: vec3<f32>, direction: vec3<f32>, caps: bool) -> f32 {
     let flags = select(RAY_FLAG_NONE, RAY_FLAG_FORCE_OPAQUE, params.whole != 0u);
     var query: ray_query;
     rayQueryInitialize(&query, world, RayDesc(flags, 0xffu, 0.0, params.delta, origin, direction));
@@ -37,5 +38,5 @@ fn way_to_hit(origin: vec3<f32>, direction: vec3<f32>) -> f32 {
 
 @compute @workgroup_size(LANES)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    trace_pixel(group, local);
+    trace_pixel(group, local, false);
 }

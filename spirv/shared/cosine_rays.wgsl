@@ -3,7 +3,8 @@
 //
 //   AO = 1/N sum_i max(0, 1 - t_i / delta)
 //
-// Kernels bind `eyes`, `geometry` and `accessibility`, and say how far a ray goes: `way_to_hit(origin, direction)`, at most `params.delta`.
+// Kernels bind `eyes`, `geometry` and `accessibility`, and say how far a ray goes: `way_to_hit(origin, direction, caps)`, at most `params.delta`;
+// `caps`: whether caps end it, too.
 
 #include "shared/geometry.wgsl"
 #include "shared/bricks.wgsl"
@@ -32,7 +33,7 @@ const TAU = 6.28318530718;
 const STEP_X = 3242174889u;
 const STEP_Y = 2447445414u;
 
-fn trace_pixel(group: vec3<u32>, local: u32) {
+fn trace_pixel(group: vec3<u32>, local: u32, caps: bool) {
     let index = (group.y * GROUPS_PER_ROW + group.x) * LANES + local;
     if index >= params.pixels {
         return;
@@ -64,7 +65,7 @@ fn trace_pixel(group: vec3<u32>, local: u32) {
         let angle = f32((i * STEP_Y + shift_y) >> 8u) / 16777216.0 * TAU;
         let ring = sqrt(u);
         let direction = tangent * (ring * cos(angle)) + bitangent * (ring * sin(angle)) + normal * sqrt(1.0 - u);
-        sum += 1.0 - way_to_hit(origin, direction) / params.delta;
+        sum += 1.0 - way_to_hit(origin, direction, caps) / params.delta;
     }
     if params.first_ray + params.rays == params.all_rays {
         sum = 1.0 - sum / f32(params.all_rays);

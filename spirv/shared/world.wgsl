@@ -20,7 +20,7 @@ struct WorldTriangle {
     a: vec4<f32>,
     // a corner; the number of its material
     b: vec4<f32>,
-    // a corner; MASKED, TWO_SIDED, SLIVER, SPARED
+    // a corner; MASKED, TWO_SIDED, SLIVER, SPARED, CAPPED
     c: vec4<f32>,
 }
 
@@ -32,6 +32,8 @@ const TWO_SIDED = 2u;
 const SLIVER = 4u;
 // Which clips leave whole.
 const SPARED = 8u;
+// Of a mesh whose cuts are closed.
+const CAPPED = 16u;
 
 // What is left of each triangle, of its area: what neither its mask nor a clip takes.
 struct Shares {
@@ -65,6 +67,9 @@ struct SurfaceMaterial {
     height: u32,
     // there is a surface where opacity is at least this
     cutoff: f32,
+    // of a capped mesh: the linear colour of its cuts, and which of all it is
+    cap: vec3<f32>,
+    body: u32,
 }
 
 struct Materials {

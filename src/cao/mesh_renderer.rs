@@ -79,7 +79,8 @@ impl MeshRenderer {
         })
     }
 
-    /// Cuts the world by other clips: what they hide is neither seen nor occludes. Surfaces that are cut open show their backs. Uses the device's queue and
+    /// Cuts the world by other clips: what they hide is neither seen nor occludes. Surfaces that are cut open show their backs, or caps where
+    /// their [materials](cao_model::surface::Material::cap) say so. Uses the device's queue and
     /// waits for it; pictures that are recorded already must have run.
     ///
     /// # Errors

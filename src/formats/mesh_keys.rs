@@ -12,6 +12,7 @@
 //!     colour = "#c8b090"               # instead of the file's own; masks stay
 //!     solid = true                     # whether the volume's opacity knows it, which it then darkens; closed meshes only; default: false
 //!     spared = true                    # whether clips leave it whole; default: false
+//!     ## cap = "#c03030"                # of a closed mesh: where clips cut it open, its cut is drawn in this colour; true: in its own; default: false, its backs are seen
 //!     two_sided = true                 # whether backs are surfaces, too; default: as the file has it, docs/formats.md
 //!
 //!     [mesh_occlusion]                 # without [[mesh]]: crytek, volumetric, hbao of what the volume's picture shows first, in place of [occlusion]
@@ -35,7 +36,7 @@ use serde::Deserialize;
 use toml::Value;
 
 use crate::keys::{existing, length, pose};
-use crate::toml_value::parse_colour;
+use crate::toml_value::{parse_colour, shown};
 use crate::{Error, Result, surface};
 use cao_model::clip::Pose;
 use cao_model::pixel_occlusion::{PixelMethod, PixelOcclusion};
@@ -58,8 +59,21 @@ pub struct MeshSource {
     pub two_sided: Option<bool>,
     /// Whether clips leave it whole.
     pub spared: bool,
+    /// Whether the surface is drawn where clips cut it open.
+    pub cap: Cap,
     /// Whether it fills the volume's opacity.
     pub solid: bool,
+}
+
+/// What is drawn where clips cut a mesh open.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cap {
+    /// Its backs.
+    None,
+    /// The cut, in the mesh's own colour: that of its first material, without textures.
+    Own,
+    /// The cut, in a linear r, g, b.
+    Colour([f32; 3]),
 }
 
 /// Where a mesh comes from.
@@ -81,12 +95,19 @@ impl MeshSource {
             MeshFrom::File(path) => surface::load(path)?,
             MeshFrom::Builtin(scene, detail) => (scene.make)(*detail),
         };
-        let changed = |surface: &Arc<Surface>| match (self.colour, self.two_sided, self.spared) {
-            (None, None, false) => surface.clone(),
-            _ => Arc::new(Surface {
-                materials: surface.materials.iter().map(|material| self.changed(material)).collect(),
-                ..(**surface).clone()
-            }),
+        let changed = |surface: &Arc<Surface>| match (self.colour, self.two_sided, self.spared, self.cap) {
+            (None, None, false, Cap::None) => surface.clone(),
+            _ => {
+                let mut materials: Vec<Material> =
+                    surface.materials.iter().map(|m| self.changed(m)).collect();
+                let cap = match self.cap {
+                    Cap::None => None,
+                    Cap::Own => materials.first().map(|material| material.colour),
+                    Cap::Colour(colour) => Some(colour),
+                };
+                materials.iter_mut().for_each(|material| material.cap = cap);
+                Arc::new(Surface { materials, ..(**surface).clone() })
+            }
         };
         // Surfaces that several instances share stay shared.
         let mut known: Vec<(Arc<Surface>, Arc<Surface>)> = Vec::new();
@@ -134,6 +155,7 @@ pub(crate) struct MeshFile {
     two_sided: Option<bool>,
     #[serde(default)]
     spared: bool,
+    cap: Option<Value>,
     #[serde(default)]
     solid: bool,
 }
@@ -161,12 +183,33 @@ impl MeshFile {
         if self.detail.is_some() && self.builtin.is_none() {
             return Err(Error::refused(&of("detail"), "has no effect without builtin"));
         }
+        let cap = match &self.cap {
+            None | Some(Value::Boolean(false)) => Cap::None,
+            Some(Value::Boolean(true)) => Cap::Own,
+            Some(colour) => {
+                let read = parse_colour(&of("cap"), colour);
+                let problem = || {
+                    format!(
+                        "{}: expected true, false, \"#rrggbb\" or [r, g, b] with numbers from 0 to 1",
+                        shown(colour)
+                    )
+                };
+                Cap::Colour(read.map_err(|_| Error::refused(&of("cap"), problem()))?)
+            }
+        };
+        if self.spared && cap != Cap::None {
+            return Err(Error::refused(
+                &of("cap"),
+                "has no effect with spared, which clips do not cut; take one of both away",
+            ));
+        }
         Ok(MeshSource {
             from,
             pose: pose(key, self.translate_mm, self.rotate_deg, self.scale.as_ref())?,
             colour: self.colour.map(|colour| parse_colour(&of("colour"), &colour)).transpose()?,
             two_sided: self.two_sided,
             spared: self.spared,
+            cap,
             solid: self.solid,
         })
     }

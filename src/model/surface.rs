@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec2, Vec3};
 
 use crate::clip::Pose;
-use crate::mesh::bounds_of;
+use crate::mesh::{TriangleMesh, bounds_of};
 use crate::{Error, Result};
 
 /// A triangle mesh as files have it.
@@ -48,6 +48,9 @@ pub struct Material {
     pub two_sided: bool,
     /// Whether clips leave it whole, as an implant that a view is opened for.
     pub spared: bool,
+    /// Linear r, g, b of the surface of the cut where clips cut a closed mesh open; `None`: its backs are seen there. All materials of a
+    /// surface have the same.
+    pub cap: Option<[f32; 3]>,
 }
 
 impl Default for Material {
@@ -61,6 +64,7 @@ impl Default for Material {
             cutoff: None,
             two_sided: false,
             spared: false,
+            cap: None,
         }
     }
 }
@@ -107,6 +111,8 @@ pub struct World {
     pub triangles: Vec<Triangle>,
     /// All materials.
     pub materials: Vec<Material>,
+    /// Of each material the number of its instance.
+    pub instance_of: Vec<u32>,
     /// Triangles that were left out because they have no area.
     pub degenerate: usize,
 }
@@ -122,7 +128,8 @@ impl Surface {
     ///
     /// # Errors
     /// [`Error::Mesh`] when an index has no position or no material, a used position is not finite, normals or texture coordinates are not as
-    /// many as positions, a texture does not have its texels, a mask has nothing to be read by, or there is no triangle.
+    /// many as positions, a texture does not have its texels, a mask has nothing to be read by, there is no triangle, or caps are asked for where
+    /// clips leave it whole, of some of its materials, or of what bounds no solid with its front outwards.
     pub fn check(&self) -> Result<()> {
         let wrong = |problem: String| Err(Error::Mesh { name: self.name.clone(), problem });
         let count = self.positions.len();
@@ -178,6 +185,38 @@ impl Surface {
                     ));
                 }
             }
+        }
+        self.check_caps()
+    }
+
+    /// Caps are of a solid, whose inside is in front of no face.
+    fn check_caps(&self) -> Result<()> {
+        let wrong = |problem: String| {
+            let problem = format!("cannot have caps: {problem}; or do without caps, which shows its backs");
+            Err(Error::Mesh { name: self.name.clone(), problem })
+        };
+        let cap = self.materials.first().and_then(|material| material.cap);
+        if let Some(other) = self.materials.iter().find(|material| material.cap != cap) {
+            return wrong(format!(
+                "material {} has another cap than the first one; a cut is of the whole mesh: give all the same",
+                crate::error::quoted(&other.name)
+            ));
+        }
+        if cap.is_none() {
+            return Ok(());
+        }
+        if self.materials.iter().any(|material| material.spared) {
+            return wrong("clips leave it whole, as it is spared; let them cut it".into());
+        }
+        let mesh = match TriangleMesh::new(&self.name, &self.positions, &self.triangles)
+            .and_then(|mesh| mesh.check_solid().map(|()| mesh))
+        {
+            Ok(mesh) => mesh,
+            Err(Error::Mesh { problem, .. }) => return wrong(problem),
+            Err(other) => return Err(other),
+        };
+        if mesh.signed_volume() < 0.0 {
+            return wrong("it is inside out; in a mesh editor, flip its faces".into());
         }
         Ok(())
     }
@@ -252,9 +291,10 @@ impl World {
                 hint: "leave instances out, or decimate meshes".into(),
             });
         }
-        for instance in instances {
+        for (number, instance) in instances.iter().enumerate() {
             instance.surface.check()?;
             instance.pose.check()?;
+            world.instance_of.extend(instance.surface.materials.iter().map(|_| number as u32));
             world.add(instance)?;
         }
         Ok(world)
@@ -369,6 +409,41 @@ mod tests {
         let world = World::new(&[Instance { surface: Arc::new(surface), pose: Pose::default() }]).unwrap();
         let mean = 0.5 * (world.triangles[0].opacity + world.triangles[1].opacity);
         assert!((mean - 0.5).abs() < 0.04, "{mean}");
+    }
+
+    #[test]
+    fn caps_are_of_solids_as_a_whole() {
+        let cube = TriangleMesh::cuboid();
+        let with = |change: fn(&mut Surface)| {
+            let capped = Material { cap: Some([0.5; 3]), ..Material::default() };
+            let mut surface = Surface {
+                name: "cube".into(),
+                positions: cube.vertices.clone(),
+                triangles: cube.triangles.clone(),
+                material_of: vec![0; 12],
+                materials: vec![capped.clone(), capped],
+                ..Surface::default()
+            };
+            change(&mut surface);
+            surface
+        };
+        let place = |surface| Instance { surface: Arc::new(surface), pose: Pose::default() };
+        let world = World::new(&[place(with(|_| ())), place(square())]).unwrap();
+        assert_eq!(world.instance_of, [0, 0, 1]);
+        for (change, expected) in [
+            ((|s: &mut Surface| s.triangles[3] = [0, 1, 2]) as fn(&mut Surface), "does not enclose a solid"),
+            (
+                |s| s.triangles.iter_mut().for_each(|t| t.swap(0, 1)),
+                "inside out; in a mesh editor, flip its faces",
+            ),
+            (|s| s.materials[1].cap = None, "material \"default\" has another cap than the first one"),
+            (|s| s.materials[1].spared = true, "clips leave it whole, as it is spared"),
+        ] {
+            let message = refusal(with(change));
+            let named =
+                message.contains("mesh cube: cannot have caps: ") && message.contains("do without caps");
+            assert!(named && message.contains(expected), "{message}");
+        }
     }
 
     #[test]

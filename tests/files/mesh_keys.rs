@@ -78,6 +78,24 @@ fn every_key_of_a_mesh_is_read() {
 }
 
 #[test]
+fn caps_are_of_one_colour_however_many_materials() {
+    let cap = |keys: &str| {
+        let scene = read(&format!("[[mesh]]\nbuiltin = \"house\"\ndetail = 1\n{keys}")).unwrap();
+        let [house] = &scene.meshes[0].instances().unwrap()[..] else { panic!("one instance") };
+        let colours: Vec<_> = house.surface.materials.iter().map(|material| material.colour).collect();
+        let caps: Vec<_> = house.surface.materials.iter().map(|material| material.cap).collect();
+        assert!(caps.iter().all(|cap| *cap == caps[0]), "{caps:?}");
+        (caps[0], colours)
+    };
+    assert_eq!(cap("").0, None);
+    assert_eq!(cap("cap = false").0, None);
+    let (own, colours) = cap("cap = true");
+    assert!(own == Some(colours[0]) && colours[1] != colours[0], "{own:?} of {colours:?}");
+    assert_eq!(cap("cap = true\ncolour = \"#00ff00\"").0, Some([0.0, 1.0, 0.0]));
+    assert_eq!(cap("cap = [1, 0, 1]").0, Some([1.0, 0.0, 1.0]));
+}
+
+#[test]
 fn instances_that_share_a_surface_still_do() {
     let scene =
         read("[[mesh]]\nbuiltin = \"colonnade\"\ndetail = 1\ncolour = \"#ffffff\"\nscale = 2").unwrap();
@@ -122,6 +140,14 @@ fn what_is_wrong_with_meshes_is_refused_by_name() {
         ("[[mesh]]\nbuiltin = \"house\"\ntranslate_mm = [nan, 0, 0]", "mesh[0].translate_mm: "),
         ("[[mesh]]\nbuiltin = \"house\"\nrotate_deg = [0, inf, 0]", "mesh[0].rotate_deg: "),
         ("[[mesh]]\nbuiltin = \"house\"\ncolour = \"red\"", "mesh[0].colour: \"red\": expected \"#rrggbb\""),
+        (
+            "[[mesh]]\nbuiltin = \"house\"\ncap = \"red\"",
+            "mesh[0].cap: \"red\": expected true, false, \"#rrggbb\"",
+        ),
+        (
+            "[[mesh]]\nbuiltin = \"house\"\ncap = true\nspared = true",
+            "mesh[0].cap: has no effect with spared, which clips do not cut; take one of both away",
+        ),
         (&many, "mesh: 65 meshes: expected at most 64"),
         (&format!("frame = \"index\"\n{house}"), "frame: has no effect without volume"),
         (&format!("transfer = \"mr\"\n{house}"), "transfer: has no effect without volume"),

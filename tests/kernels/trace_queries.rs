@@ -2,9 +2,11 @@
 
 use cao::mesh::ambient::{ByRays, PixelAmbient, Pixels as On};
 use cao_gpu::{Access, DeviceKind, Gpu, OpenOptions};
-use cao_model::clip::Clip;
+use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::surface::World;
-use cao_testing::worlds::{Pixels, clips, corner, corner_eyes, cuboid, floats, sheet, world_of};
+use cao_testing::worlds::{
+    Pixels, clips, corner, corner_eyes, cuboid, floats, sheet, solids, solids_eyes, world_of,
+};
 use cao_testing::*;
 use glam::Vec3;
 
@@ -77,6 +79,15 @@ fn queries_give_what_walks_through_the_tree_give() {
         let shaded = walked.iter().filter(|value| **value < 0.9).count();
         assert!(shaded > walked.len() / 16, "{shaded} pixels have any occlusion");
     }
+    // Of caps the structure knows nothing: rays walk.
+    let plane = Pose { translate_mm: Vec3::Z * 20.0, rotate_deg: Vec3::X * 10.0, ..Pose::default() };
+    let cut = [Clip { pose: plane, ..Clip::remove(Shape::Plane) }];
+    let views = solids_eyes(Vec3::new(30.0, -95.0, 70.0), SIZE);
+    let capped = Pixels::clipped(&gpu, &solids(), &cut, &views, SIZE);
+    assert!(capped.surfaces.caps());
+    let both = [ByRays::walks, ByRays::queries].map(|way| traced(&gpu, &capped, way(&gpu, RAYS).unwrap()));
+    assert!(both[0] == both[1]);
+    drop(capped);
     // Controls: a kernel that did not ask clips, or masks.
     let pixels =
         |world: &World, clips: &[Clip]| Pixels::clipped(&gpu, world, clips, &corner_eyes(SIZE), SIZE);

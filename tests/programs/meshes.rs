@@ -85,3 +85,50 @@ fn meshes_stand_in_volumes_and_are_cut_with_them() {
     let refused = folder.run("render whole.toml -o x.png --budget-ms 10");
     assert!(refused.code == Some(2) && refused.err.contains("this scene has meshes"), "{}", refused.err);
 }
+
+#[test]
+fn cut_meshes_show_caps_where_they_are_asked_for() {
+    let folder = Folder::with_device();
+    folder.put("cube.obj", crate::support::cube_obj(6)).put("open.obj", crate::support::cube_obj(5));
+    let scene = |mesh: &str, cap: &str| {
+        format!(
+            "[[mesh]]\nfile = \"{mesh}.obj\"\nscale = 20\ncolour = \"#3060c0\"\n{cap}\n[[clip]]\nshape = \"sphere\"\nscale = 18\n\
+             translate_mm = [8, -20, 10]\n[mesh_occlusion]\nmethod = \"rays\"\nrays = 8\n[image]\nwidth = 64\nheight = 64\n"
+        )
+    };
+    // Pixels of a scene that are red, and blue.
+    let drawn = |name: &str, cap: &str| {
+        folder.put(&format!("{name}.toml"), scene("cube", cap));
+        folder.json(&format!("render {name}.toml -o {name}.png"));
+        let picture = image::open(folder.path(&format!("{name}.png"))).unwrap().into_rgb8();
+        let count = |colour: usize, other: usize| {
+            picture.pixels().filter(|pixel| pixel[colour] > pixel[other].saturating_add(20)).count()
+        };
+        (count(0, 2), count(2, 0), picture.into_raw())
+    };
+    let (backs, red, own) =
+        (drawn("backs", ""), drawn("red", "cap = \"#c03020\""), drawn("own", "cap = true"));
+    assert!(backs.0 == 0 && own.0 == 0, "{} and {} red pixels", backs.0, own.0);
+    assert!(red.0 > 300 && red.1 > 300, "{} red and {} blue pixels", red.0, red.1);
+    assert!(own.2 != backs.2, "caps in the mesh's own colour are its backs");
+    assert!(drawn("none", "cap = false").2 == backs.2);
+    for (mesh, cap, parts) in [
+        (
+            "open",
+            "cap = true",
+            &[
+                "open.obj",
+                "cannot have caps: the surface does not enclose a solid",
+                "close the holes",
+                "do without caps",
+            ][..],
+        ),
+        ("cube", "cap = true\nspared = true", &["mesh[0].cap: has no effect with spared"]),
+        ("cube", "cap = 3", &["mesh[0].cap: 3: expected true, false, \"#rrggbb\""]),
+    ] {
+        folder.put("refused.toml", scene(mesh, cap));
+        let refused = folder.run("render refused.toml -o x.png");
+        assert_eq!(refused.code, Some(1), "{}", refused.err);
+        parts.iter().for_each(|part| assert!(refused.err.contains(part), "{part}: {}", refused.err));
+    }
+}

@@ -5,13 +5,14 @@ use cao::mesh_renderer::MeshRenderer;
 use cao::renderer::{COLOUR, Renderer};
 use cao_gpu::Access;
 use cao_model::builtin::builtin_box;
-use cao_model::clip::{Clip, Shape};
+use cao_model::clip::{Clip, Pose, Shape};
 use cao_model::look::{Look, Shading};
-use cao_model::pixel_occlusion::{PIXEL_METHODS, PixelOcclusion};
+use cao_model::mesh::TriangleMesh;
+use cao_model::pixel_occlusion::{PIXEL_METHODS, PixelMethod, PixelOcclusion};
 use cao_model::settings::Setup;
 use cao_model::surface::{Material, World};
 use cao_model::transfer::TransferFunction;
-use cao_testing::worlds::{clips, corner, corner_eyes, sheet, world_of};
+use cao_testing::worlds::{clips, corner, corner_eyes, sheet, solid, solids_eyes, world_of};
 use cao_testing::*;
 use glam::Vec3;
 
@@ -119,6 +120,84 @@ fn a_volume_is_in_front_of_meshes_and_behind_them() {
         .filter(|&i| lit.colour[0][i][0] < 0.95 * lit_alone.colour[0][i][0]);
     assert!(darker.count() > 30);
     drop((renderer, meshes));
+    close(gpu);
+}
+
+/// A plane cuts a volume and a ball in it: nothing of the volume is in front of the ball's cap, and nothing behind it shows.
+#[test]
+fn volumes_end_at_caps() {
+    let gpu = open();
+    let volume = builtin_box("engine", [32, 28, 30], [1.0; 3]).unwrap();
+    let transfer = TransferFunction::preset("auto", volume.range()).unwrap();
+    let mut renderer =
+        Renderer::new(&gpu, &volume, transfer, Setup::new(volume.min_spacing()), COLOUR).unwrap();
+    let front = Pose { translate_mm: Vec3::Y * -1.0, rotate_deg: Vec3::X * 90.0, ..Pose::default() };
+    let cut = [Clip { pose: front, ..Clip::remove(Shape::Plane) }];
+    renderer.set_clips(&cut).unwrap();
+    renderer.update(&mut |_| ()).unwrap();
+    let views = eyes(&volume, 30.0);
+    let look = Look { shading: Shading::None, ..Look::default() };
+    let mut ball = solid(&TriangleMesh::sphere(3), [0.9, 0.1, 0.1]);
+    ball.positions.iter_mut().for_each(|position| *position *= 9.0);
+    let mut meshes = MeshRenderer::new(&gpu, &world_of(vec![ball]), PixelOcclusion::default()).unwrap();
+    let mut draw = |clips: &[Clip]| {
+        meshes.set_clips(clips).unwrap();
+        let alone = meshes.draw(&views, &look, SIZE, None, &mut |_| ()).unwrap().0;
+        (alone, meshes.draw(&views, &look, SIZE, Some(&renderer), &mut |_| ()).unwrap().0)
+    };
+    let (_, whole) = draw(&[]);
+    let (alone, both) = draw(&cut);
+    let (volume_alone, _) = renderer.draw(&views, &look, SIZE).unwrap();
+    let (mut on_cap, mut in_volume) = (0, 0);
+    for eye in 0..2 {
+        for i in 0..both.depth[eye].len() {
+            let [r, g, _, a] = alone.colour[eye][i];
+            if a == 1.0 && r > 2.0 * g {
+                let off = (0..3).map(|k| (both.colour[eye][i][k] - alone.colour[eye][i][k]).abs());
+                assert!(off.fold(0.0, f32::max) < 2e-3 && both.depth[eye][i] == alone.depth[eye][i]);
+                on_cap += 1;
+                in_volume += u32::from(volume_alone.colour[eye][i][3] > 0.5);
+            }
+        }
+    }
+    assert!(
+        on_cap > 300 && in_volume > 100,
+        "{on_cap} pixels on the cap, {in_volume} of them in front of the volume"
+    );
+    assert!(whole.colour != both.colour);
+    drop((renderer, meshes));
+    close(gpu);
+}
+
+/// A bowl, half a ball of 15 mm taken out of a block: to rays its cap occludes itself; to occlusion volumes, which are of triangles, it does not.
+#[test]
+fn caps_occlude_rays_and_no_volumes() {
+    let gpu = open();
+    let mut block = solid(&TriangleMesh::cuboid(), [0.9, 0.1, 0.1]);
+    block.positions.iter_mut().for_each(|position| *position *= 20.0);
+    let world = world_of(vec![block]);
+    let bowl = Pose { translate_mm: Vec3::Z * 20.0, scale: Vec3::splat(15.0), ..Pose::default() };
+    let views = solids_eyes(Vec3::new(10.0, -30.0, 90.0), SIZE);
+    let open_at = |method: PixelMethod| {
+        let delta = if method == PixelMethod::Aov { 18.0 } else { 30.0 };
+        let occlusion = PixelOcclusion { delta_mm: Some(delta), ..PixelOcclusion::of(method) };
+        let mut renderer = MeshRenderer::new(&gpu, &world, occlusion).unwrap();
+        renderer.set_clips(&[Clip { pose: bowl, ..Clip::remove(Shape::Sphere) }]).unwrap();
+        renderer.draw(&views, &Look::default(), SIZE, None, &mut |_| ()).unwrap();
+        let values = renderer.accessibility().unwrap();
+        let unlit = Look { shading: Shading::None, ..Look::default() };
+        let image = renderer.draw(&views, &unlit, SIZE, None, &mut |_| ()).unwrap().0;
+        let colours = image.colour.concat();
+        let on_cap = |i: &usize| {
+            let [r, g, ..] = colours[*i];
+            r > 2.0 * g
+        };
+        let pixels: Vec<usize> = (0..values.len()).filter(on_cap).collect();
+        assert!(pixels.len() > 500, "{} pixels on caps", pixels.len());
+        pixels.iter().map(|i| f64::from(values[*i])).sum::<f64>() / pixels.len() as f64
+    };
+    let (rays, volumes) = (open_at(PixelMethod::Rays), open_at(PixelMethod::Aov));
+    assert!((0.5..0.8).contains(&rays) && volumes > 0.95, "{rays} by rays, {volumes} by volumes");
     close(gpu);
 }
 

@@ -5,6 +5,7 @@ use cao::mesh::geometry::Geometry;
 use cao::mesh::surfaces::Surfaces;
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Image};
 use cao_model::clip::{Clip, Mode, Pose, Shape};
+use cao_model::mesh::TriangleMesh;
 use cao_model::settings::MapSettings;
 use cao_model::surface::{Instance, Material, Surface, Texture, World};
 use cao_model::view::{StereoRig, Tangents, View};
@@ -47,6 +48,57 @@ pub fn cuboid(low: Vec3, high: Vec3) -> Surface {
     }
     surface.material_of = vec![0; 12];
     surface
+}
+
+/// A closed mesh whose cuts are of this colour.
+pub fn solid(mesh: &TriangleMesh, cap: [f32; 3]) -> Surface {
+    Surface {
+        name: mesh.name.clone(),
+        positions: mesh.vertices.clone(),
+        triangles: mesh.triangles.clone(),
+        material_of: vec![0; mesh.triangles.len()],
+        materials: vec![Material { cap: Some(cap), ..Material::default() }],
+        ..Surface::default()
+    }
+}
+
+/// A ball with another in it and a box that runs into it, all with caps, over a floor without.
+pub fn solids() -> World {
+    let at = |translate_mm: Vec3, rotate_deg: Vec3, scale: Vec3, surface: Surface| Instance {
+        surface: Arc::new(surface),
+        pose: Pose { translate_mm, rotate_deg, scale },
+    };
+    let floor =
+        sheet(Vec3::new(-60.0, -60.0, -36.0), Vec3::X * 120.0, Vec3::Y * 120.0, 2, Material::default());
+    World::new(&[
+        at(
+            Vec3::ZERO,
+            Vec3::new(20.0, 40.0, 60.0),
+            Vec3::new(30.0, 34.0, 28.0),
+            solid(&TriangleMesh::sphere(2), [0.8, 0.1, 0.1]),
+        ),
+        at(
+            Vec3::new(5.0, -4.0, 3.0),
+            Vec3::ZERO,
+            Vec3::splat(12.0),
+            solid(&TriangleMesh::sphere(1), [0.1, 0.1, 0.8]),
+        ),
+        at(
+            Vec3::new(34.0, 8.0, 0.0),
+            Vec3::new(30.0, 0.0, 45.0),
+            Vec3::new(12.0, 9.0, 16.0),
+            solid(&TriangleMesh::cuboid(), [0.1, 0.8, 0.1]),
+        ),
+        at(Vec3::ZERO, Vec3::ZERO, Vec3::ONE, floor),
+    ])
+    .unwrap()
+}
+
+/// Both eyes that look at them from a place.
+pub fn solids_eyes(position: Vec3, size: [u32; 2]) -> [View; 2] {
+    let rig =
+        StereoRig { position, target: Vec3::ZERO, up: Vec3::Z, ipd_mm: 8.0, fov_deg: 45.0, screen_mm: None };
+    rig.views(size[0] as f32 / size[1] as f32, 1.0, 1000.0).unwrap()
 }
 
 /// All of them where they are.

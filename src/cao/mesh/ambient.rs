@@ -51,8 +51,8 @@ pub struct ByRays {
 /// How rays find what they hit.
 enum Way {
     Walks(Trace),
-    /// With the structure of the triangles that were prepared for.
-    Queries(TraceQueries, Option<(Buffer, AccelerationStructure)>),
+    /// With the structure of the triangles that were prepared for, and walks for worlds with caps, which it knows nothing of.
+    Queries(TraceQueries, Trace, Option<(Buffer, AccelerationStructure)>),
 }
 
 /// Rays times pixels of a part: some hundredth of a second of a software driver at each of ten thousand triangles' depth of tree.
@@ -87,7 +87,7 @@ impl ByRays {
     /// # Errors
     /// A device without ([`Gpu::ray_queries`]).
     pub fn queries(gpu: &Gpu, rays: u32) -> Result<Self> {
-        Ok(Self { way: Way::Queries(TraceQueries::new(gpu)?, None), rays })
+        Ok(Self { way: Way::Queries(TraceQueries::new(gpu)?, Trace::new(gpu)?, None), rays })
     }
 
     fn of_a_part(on: &Pixels) -> u32 {
@@ -98,7 +98,7 @@ impl ByRays {
 
 impl PixelAmbient for ByRays {
     fn prepare(&mut self, on: &Pixels) -> Result<()> {
-        let Way::Queries(_, made) = &mut self.way else { return Ok(()) };
+        let Way::Queries(.., made) = &mut self.way else { return Ok(()) };
         let triangles = &on.surfaces.triangles;
         if !made.as_ref().is_some_and(|(of, _)| of.is(triangles)) {
             *made = Some((triangles.clone(), on.surfaces.structure(on.gpu)?));
@@ -115,11 +115,15 @@ impl PixelAmbient for ByRays {
         let some = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
         let rays = Rays { some, all: self.rays };
         match &self.way {
+            Way::Queries(_, trace, _) if surfaces.caps() => {
+                rec.stage(stages::TRACE)?;
+                trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
+            }
             Way::Walks(trace) => {
                 rec.stage(stages::TRACE)?;
                 trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
             }
-            Way::Queries(trace, Some((of, world))) if of.is(&surfaces.triangles) => {
+            Way::Queries(trace, _, Some((of, world))) if of.is(&surfaces.triangles) => {
                 rec.stage(stages::TRACE)?;
                 trace.record(rec, (surfaces, world), geometry, delta_mm, rays, accessibility)?;
             }

@@ -9,7 +9,7 @@ use crate::host::device_buffer;
 use crate::mesh::shares::Shares;
 use crate::{Error, Result};
 use bytemuck::Zeroable;
-use cao_gpu::{AccelerationStructure, Access, Buffer, Corners, Gpu};
+use cao_gpu::{AccelerationStructure, Access, Buffer, Corners, Gpu, Pipeline, Shader};
 use cao_kernels::gather::CLAMP;
 use cao_kernels::gbuffer as kernel;
 use cao_model::bvh::{Bounds, Bvh, Node};
@@ -19,6 +19,7 @@ use cao_model::settings::MapSettings;
 use cao_model::surface::{Triangle, World};
 use glam::Vec3;
 use std::mem::offset_of;
+use std::sync::OnceLock;
 
 /// A world's triangles on the device.
 pub struct Surfaces {
@@ -40,6 +41,8 @@ pub struct Surfaces {
     pub ordered: Vec<Triangle>,
     /// and whether their backs are surfaces too.
     pub two_sided: Vec<bool>,
+    /// Whether any mesh shows caps where it is cut.
+    capped: bool,
     nodes: Vec<Node>,
     share_out: Shares,
     /// Some triangles have masks.
@@ -74,10 +77,12 @@ impl Surfaces {
             ordered.iter().map(|t| world.materials[t.material as usize].two_sided).collect();
         let mut texels: Vec<u8> = Vec::new();
         let mut materials = Vec::new();
-        for material in &world.materials {
+        for (material, body) in world.materials.iter().zip(&world.instance_of) {
             let mut on_device = kernel::SurfaceMaterial {
                 colour: glam::Vec3::from(material.colour).extend(material.alpha).to_array(),
                 cutoff: material.cutoff.unwrap_or_default(),
+                cap: material.cap.unwrap_or_default(),
+                body: *body,
                 ..kernel::SurfaceMaterial::zeroed()
             };
             if let Some(texture) = &material.texture {
@@ -104,6 +109,7 @@ impl Surfaces {
             shares: device_buffer(gpu, "shares", bytemuck::cast_slice(&whole))?,
             clips,
             half_mm,
+            capped: world.materials.iter().any(|material| material.cap.is_some()),
             share_out: Shares::new(gpu)?,
             masked: ordered.iter().any(|t| world.materials[t.material as usize].cutoff.is_some()),
             clipped: false,
@@ -156,6 +162,11 @@ impl Surfaces {
         Ok(gpu.acceleration_structure("world", corners)?)
     }
 
+    /// Whether rays have to look for caps: clips cut meshes that ask for them.
+    pub fn caps(&self) -> bool {
+        self.capped && self.clipped
+    }
+
     /// The tree of what each triangle may occlude within `delta_mm`; with corners `clamped` as printed. Uses the device's queue and waits for it.
     ///
     /// # Errors
@@ -176,6 +187,19 @@ impl Surfaces {
         let tree = device_buffer(gpu, "tree of volumes", bytemuck::cast_slice(&packed(&nodes)))?;
         Ok(VolumeTree { tree, clamped })
     }
+}
+
+/// The pipeline `capped` of a kernel that has one for worlds with [caps](Surfaces::caps), which most do without.
+pub fn built<'a>(
+    gpu: &Gpu,
+    pipeline: &'a OnceLock<Pipeline>,
+    shader: &'static Shader,
+) -> Result<&'a Pipeline> {
+    if let Some(pipeline) = pipeline.get() {
+        return Ok(pipeline);
+    }
+    let built = gpu.compute(shader, "capped")?;
+    Ok(pipeline.get_or_init(|| built))
 }
 
 /// Corners that stick out of a volume farther than this, in deltas, make it a sliver's, unless they are clamped (AOV §5.2: at 2, which cuts
@@ -249,6 +273,9 @@ fn on_device(triangle: &Triangle, world: &World) -> kernel::WorldTriangle {
     }
     if material.spared {
         kind |= kernel::SPARED;
+    }
+    if material.cap.is_some() {
+        kind |= kernel::CAPPED;
     }
     if is_sliver(triangle.corners) {
         kind |= kernel::SLIVER;

@@ -4,15 +4,18 @@
 
 use crate::host::row_of_groups;
 use crate::mesh::geometry::Geometry;
-use crate::mesh::surfaces::Surfaces;
+use crate::mesh::surfaces::{Surfaces, built};
 use crate::{Error, Result};
 use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
 use cao_kernels::trace as kernel;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// The kernel `trace`.
 pub struct Trace {
+    gpu: Gpu,
     pipeline: Pipeline,
+    capped: OnceLock<Pipeline>,
 }
 
 /// Rays of each pixel.
@@ -55,7 +58,8 @@ impl Rays {
 impl Trace {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        Ok(Self { pipeline: gpu.compute(&kernel::SHADER, "main")? })
+        let pipeline = gpu.compute(&kernel::SHADER, "main")?;
+        Ok(Self { gpu: gpu.clone(), pipeline, capped: OnceLock::new() })
     }
 
     /// Rays of all pixels, some at a time, which follow on those of the call before. `accessibility` holds an f32 a pixel, which is 1 − AO after the
@@ -86,7 +90,9 @@ impl Trace {
             accessibility,
         };
         let groups = row_of_groups(params.pixels.div_ceil(kernel::MAIN_WORKGROUP[0]));
-        rec.dispatch(&self.pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
+        let pipeline =
+            if surfaces.caps() { built(&self.gpu, &self.capped, &kernel::SHADER)? } else { &self.pipeline };
+        rec.dispatch(pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
         Ok(())
     }
 }

@@ -299,6 +299,7 @@ impl Reader<'_> {
             cutoff,
             two_sided: json.double_sided,
             spared: false,
+            cap: None,
         })
     }
 

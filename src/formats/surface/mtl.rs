@@ -139,6 +139,7 @@ impl Library {
             cutoff: masked.then_some(CUTOFF),
             two_sided: masked,
             spared: false,
+            cap: None,
         }))
     }
 }

@@ -13,7 +13,11 @@ pub fn lit(world: &World, shown: &Shown, open: f64, look: &Look, light: DVec3, e
     let weights = [1.0 - u - v, u, v];
     let uv: Vec2 = triangle.uvs.iter().zip(weights).map(|(uv, weight)| *uv * weight as f32).sum();
     let mean: DVec3 = triangle.normals.iter().zip(weights).map(|(n, weight)| n.as_dvec3() * weight).sum();
-    let normal = if mean.dot(shown.normal) < 0.0 { -mean.normalize() } else { mean.normalize() };
+    let normal = match shown.cap {
+        true => shown.normal,
+        false if mean.dot(shown.normal) < 0.0 => -mean.normalize(),
+        false => mean.normalize(),
+    };
     let material = &world.materials[triangle.material as usize];
     let coded = material.texture.as_ref().map_or([1.0; 4], |texture| texture.at(uv));
     let towards_eye = (eye - shown.place).normalize();
@@ -27,7 +31,10 @@ pub fn lit(world: &World, shown: &Shown, open: f64, look: &Look, light: DVec3, e
     std::array::from_fn(|i| {
         let coded = f64::from(coded[i]);
         let linear = if coded <= 0.04045 { coded / 12.92 } else { ((coded + 0.055) / 1.055).powf(2.4) };
-        let colour = f64::from(material.colour[i]) * linear;
+        let colour = match material.cap.filter(|_| shown.cap) {
+            Some(cap) => f64::from(cap[i]),
+            None => f64::from(material.colour[i]) * linear,
+        };
         ambient_open * k_a * colour + rest_open * (k_d * colour * diffuse + k_s * specular)
     })
 }

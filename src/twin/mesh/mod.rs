@@ -1,5 +1,6 @@
 //! Surfaces: ambient occlusion of points by triangles, exactly and by volumes; rays; what pixels show.
 
+pub mod caps;
 pub mod gather;
 pub mod gbuffer;
 pub mod light;

@@ -1,6 +1,7 @@
 //! Ambient occlusion by rays (AOV §6): `AO = (1/π) ∫ max(0, 1 − t(ω)/δ) (ω·n) dω` over the half sphere, by the midpoints of a grid over the unit
 //! square, `r² = u`, `φ = 2πv`: another rule than the kernel's sequence, which converges to the same.
 
+use super::caps::first_cap;
 use super::ray::first_hit;
 use cao_model::clip::Clip;
 use cao_model::surface::World;
@@ -23,8 +24,9 @@ pub fn traced(world: &World, clips: &[Clip], place: DVec3, normal: DVec3, delta:
             let ring = u.sqrt();
             let direction =
                 tangent * (ring * angle.cos()) + bitangent * (ring * angle.sin()) + normal * (1.0 - u).sqrt();
-            sum +=
-                first_hit(world, clips, origin, direction, 0.0, delta).map_or(0.0, |hit| 1.0 - hit.t / delta);
+            let hit = first_hit(world, clips, origin, direction, 0.0, delta).map_or(delta, |hit| hit.t);
+            let t = first_cap(world, clips, origin, direction, 0.0, hit).map_or(hit, |cap| cap.t);
+            sum += 1.0 - t / delta;
         }
     }
     sum / f64::from(edge).powi(2)
