@@ -52,8 +52,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let first = leaf_first(node);
             for (var k = first; k < first + leaf_count(node); k++) {
                 let clamped = params.clamped != 0u;
-                let seen = faced(triangles.triangle[k], shares.triangle[k], point, params.delta, nothing, clamped);
-                count += u32(seen.falloff > 0.0);
+                let triangle = triangles.triangle[k];
+                let falloff = falloff_of(triangle, shares.triangle[k], point, params.delta, nothing, clamped);
+                count += u32(falloff > 0.0);
             }
             i++;
         }

@@ -4,7 +4,7 @@
 //
 // `full` is for every pixel; `sparse` for one pixel of a block of step x step, the middle one (section 3.2); `failed` for those that
 // `upsample` listed. A workgroup walks together: for the pixels of a tile, which then go over the same triangles, each for itself; or for one
-// pixel alone, whose triangles are divided among all.
+// pixel alone, whose triangles are divided among all. Of each there is one for volumes whose corners are clamped.
 
 #include "shared/geometry.wgsl"
 #include "shared/occluder.wgsl"
@@ -24,8 +24,6 @@ struct GatherParams {
     groups: u32,
     // mm: how far occlusion reaches
     delta: f32,
-    // whether volumes end where their corners are clamped
-    clamped: u32,
 }
 
 var<immediate> params: GatherParams;
@@ -59,13 +57,12 @@ fn place_at(view: u32, pixel: vec2<u32>) -> Place {
 }
 
 // What the triangles of a leaf contribute there, in units.
-fn of_leaf(leaf: TreeNode, place: Place) -> u32 {
+fn of_leaf(leaf: TreeNode, place: Place, clamped: bool) -> u32 {
     let first = leaf_first(leaf);
     var sum = 0u;
     for (var k = first; k < first + leaf_count(leaf); k++) {
         let triangle = triangles.triangle[k];
         let share = shares.triangle[k];
-        let clamped = params.clamped != 0u;
         let part = contribution(triangle, share, place.point, place.normal, params.delta, place.nothing, clamped);
         sum += u32(min(part, 1.0) * f32(WHOLE) + 0.5);
     }
@@ -88,7 +85,7 @@ var<workgroup> outer: array<atomic<u32>, 2>;
 
 // Walks the tree with all invocations of a group, of which each sums: in units, the triangles that contribute to its own place, or its part
 // of those that contribute to the one place that all have. `low` and `high`: a box about all places.
-fn walk(low: vec3<f32>, high: vec3<f32>, place: Place, for_one: bool, lane: u32) -> u32 {
+fn walk(low: vec3<f32>, high: vec3<f32>, place: Place, for_one: bool, lane: u32, clamped: bool) -> u32 {
     if lane == 0u {
         nodes[0] = 0u;
         atomicStore(&inner[0], 0u);
@@ -140,13 +137,13 @@ fn walk(low: vec3<f32>, high: vec3<f32>, place: Place, for_one: bool, lane: u32)
                 let some = min(ready, LANES);
                 ready -= some;
                 if lane < some {
-                    sum = min(sum + of_leaf(tree.node[leaves[ready + lane]], place), WHOLE);
+                    sum = min(sum + of_leaf(tree.node[leaves[ready + lane]], place, clamped), WHOLE);
                 }
             } else {
                 ready--;
                 let leaf = tree.node[leaves[ready]];
                 if place.shown && all(place.point >= leaf.low) && all(place.point <= leaf.high) {
-                    sum = min(sum + of_leaf(leaf, place), WHOLE);
+                    sum = min(sum + of_leaf(leaf, place, clamped), WHOLE);
                 }
             }
         }
@@ -157,14 +154,14 @@ fn walk(low: vec3<f32>, high: vec3<f32>, place: Place, for_one: bool, lane: u32)
 var<workgroup> total: atomic<u32>;
 
 // Occlusion of one pixel, the same for all invocations, by all of them together.
-fn occlusion_of(view: u32, pixel: vec2<u32>, lane: u32) -> f32 {
+fn occlusion_of(view: u32, pixel: vec2<u32>, lane: u32, clamped: bool) -> f32 {
     if lane == 0u {
         atomicStore(&total, 0u);
     }
     let place = place_at(view, pixel);
     // Of nothing a box that nothing meets.
     let far = select(3e38, 0.0, place.shown);
-    let sum = walk(place.point + far, place.point + far, place, true, lane);
+    let sum = walk(place.point + far, place.point + far, place, true, lane, clamped);
     atomicAdd(&total, sum);
     workgroupBarrier();
     let all = atomicLoad(&total);
@@ -174,9 +171,7 @@ fn occlusion_of(view: u32, pixel: vec2<u32>, lane: u32) -> f32 {
 
 var<workgroup> shown: array<vec4<f32>, LANES>;
 
-// A workgroup a tile.
-@compute @workgroup_size(8, 4)
-fn full(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn write_full(id: vec3<u32>, lane: u32, clamped: bool) {
     let pixel = vec2(id.x, params.first_row + id.y);
     let there = id.y < params.rows && all(pixel < params.size);
     var place = place_at(id.z, min(pixel, params.size - 1u));
@@ -191,34 +186,63 @@ fn full(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_
             high = max(high, shown[k].xyz);
         }
     }
-    let sum = walk(low, high, place, false, lane);
+    let sum = walk(low, high, place, false, lane, clamped);
     if there {
         accessibility.pixel[pixel_index(params.size, id.z, pixel)] = 1.0 - f32(sum) / f32(WHOLE);
+    }
+}
+
+// A workgroup a tile.
+@compute @workgroup_size(8, 4)
+fn full(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    write_full(id, lane, false);
+}
+
+@compute @workgroup_size(8, 4)
+fn full_clamped(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    write_full(id, lane, true);
+}
+
+fn write_sparse(group: vec3<u32>, lane: u32, clamped: bool) {
+    let pixel = min(group.xy * params.step + params.step / 2u, params.size - 1u);
+    let occlusion = occlusion_of(group.z, pixel, lane, clamped);
+    if lane == 0u {
+        sparse_sums.block[pixel_index(params.blocks, group.z, group.xy)] = occlusion;
     }
 }
 
 // A workgroup a block.
 @compute @workgroup_size(LANES)
 fn sparse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let pixel = min(group.xy * params.step + params.step / 2u, params.size - 1u);
-    let occlusion = occlusion_of(group.z, pixel, lane);
-    if lane == 0u {
-        sparse_sums.block[pixel_index(params.blocks, group.z, group.xy)] = occlusion;
-    }
+    write_sparse(group, lane, false);
 }
 
-// A workgroup every `groups`-th pixel that `upsample` has listed.
 @compute @workgroup_size(LANES)
-fn failed(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+fn sparse_clamped(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    write_sparse(group, lane, true);
+}
+
+fn write_failed(group: vec3<u32>, lane: u32, clamped: bool) {
     let pixels = params.size.x * params.size.y;
     let listed = atomicLoad(&failures.count);
     for (var i = group.x; i < listed; i += params.groups) {
         let index = failures.pixel[i];
         let in_view = index % pixels;
         let pixel = vec2(in_view % params.size.x, in_view / params.size.x);
-        let occlusion = occlusion_of(index / pixels, pixel, lane);
+        let occlusion = occlusion_of(index / pixels, pixel, lane, clamped);
         if lane == 0u {
             accessibility.pixel[index] = 1.0 - occlusion;
         }
     }
+}
+
+// A workgroup every `groups`-th pixel that `upsample` has listed.
+@compute @workgroup_size(LANES)
+fn failed(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    write_failed(group, lane, false);
+}
+
+@compute @workgroup_size(LANES)
+fn failed_clamped(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    write_failed(group, lane, true);
 }

@@ -19,8 +19,6 @@ struct VolumesParams {
     first: u32,
     count: u32,
     delta: f32,
-    // whether volumes end where their corners are clamped
-    clamped: u32,
 }
 
 struct Items {
@@ -69,7 +67,7 @@ fn place_in(vertex: u32, corners: u32) -> vec2<u32> {
 
 // A corner of a triangle's volume: of its prism the triangle's corner, moved out until it is delta from both edges (eq. 23 to 29), or as far
 // as it is clamped; of a sliver one of the box about its longest edge, delta around it.
-fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32> {
+fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32, clamped: bool) -> vec3<f32> {
     let a = triangle.a.xyz;
     let b = triangle.b.xyz;
     let c = triangle.c.xyz;
@@ -77,7 +75,7 @@ fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32>
     let kind = u32(triangle.c.w);
     let under = select(0.0, -delta, (kind & TWO_SIDED) != 0u);
     let height = select(under, delta, place.y == 1u);
-    if params.clamped == 0u && (kind & SLIVER) != 0u {
+    if !clamped && (kind & SLIVER) != 0u {
         let along = longest_edge(a, b, c);
         let across = cross(face, along);
         let u = vec2(dot(b - a, along), dot(c - a, along));
@@ -102,7 +100,7 @@ fn corner_of(triangle: WorldTriangle, place: vec2<u32>, delta: f32) -> vec3<f32>
     }
     let along_next = normalize(next - corner);
     let along_before = normalize(corner - before);
-    if params.clamped != 0u {
+    if clamped {
         return corner + clamped_extension(along_next, along_before, face, delta) + face * height;
     }
     let inward = cross(face, along_next);
@@ -121,11 +119,20 @@ fn vertices() -> u32 {
     return 12u * params.corners - 12u;
 }
 
-@vertex
-fn dynamic_volume(@builtin(vertex_index) index: u32) -> Vertex {
+fn made_by_vertex(index: u32, clamped: bool) -> Vertex {
     let triangle = items.triangle[params.first + index / vertices()];
     let place = place_in(index % vertices(), params.corners);
-    return drawn(corner_of(triangles.triangle[triangle], place, params.delta), triangle);
+    return drawn(corner_of(triangles.triangle[triangle], place, params.delta, clamped), triangle);
+}
+
+@vertex
+fn dynamic_volume(@builtin(vertex_index) index: u32) -> Vertex {
+    return made_by_vertex(index, false);
+}
+
+@vertex
+fn dynamic_volume_clamped(@builtin(vertex_index) index: u32) -> Vertex {
+    return made_by_vertex(index, true);
 }
 
 @vertex
@@ -135,27 +142,45 @@ fn static_volume(@builtin(vertex_index) index: u32) -> Vertex {
     return drawn(made.corner[8u * item + 4u * place.y + place.x].xyz, items.triangle[item]);
 }
 
-@fragment
-fn occlude(in: Vertex) -> @location(0) f32 {
+fn occlusion_in(in: Vertex, clamped: bool) -> f32 {
     let pixel = vec2<u32>(in.position.xy);
     let here = geometry.pixel[pixel_index(params.size, params.view, pixel)];
     let point = position_of(eyes.eye[params.view], params.size, pixel, here.w);
     let triangle = triangles.triangle[in.triangle];
     let share = shares.triangle[in.triangle];
     let nothing = uncertainty(point, here.w);
-    return contribution(triangle, share, point, here.xyz, params.delta, nothing, params.clamped != 0u);
+    return contribution(triangle, share, point, here.xyz, params.delta, nothing, clamped);
+}
+
+@fragment
+fn occlude(in: Vertex) -> @location(0) f32 {
+    return occlusion_in(in, false);
+}
+
+@fragment
+fn occlude_clamped(in: Vertex) -> @location(0) f32 {
+    return occlusion_in(in, true);
 }
 
 // The corners of the volumes of a static world.
-@compute @workgroup_size(64)
-fn corners(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+fn make_corners(group: vec3<u32>, local: u32, clamped: bool) {
     let work = (group.y * GROUPS_PER_ROW + group.x) * 64u + local;
     if work >= 8u * params.count {
         return;
     }
     let triangle = triangles.triangle[items.triangle[work / 8u]];
     let place = vec2(work % 4u, work / 4u % 2u);
-    corners_to_make.corner[work] = vec4(corner_of(triangle, place, params.delta), 1.0);
+    corners_to_make.corner[work] = vec4(corner_of(triangle, place, params.delta, clamped), 1.0);
+}
+
+@compute @workgroup_size(64)
+fn corners(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    make_corners(group, local, false);
+}
+
+@compute @workgroup_size(64)
+fn corners_clamped(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+    make_corners(group, local, true);
 }
 
 struct Filled {

@@ -66,25 +66,18 @@ fn occlusion_by(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>, normal: vec3<f32>) -> 
     return max(0.0, -sum / TURN);
 }
 
-// A triangle as a point sees it: its corners, so that they face the point, and g.
-struct Faced {
-    a: vec3<f32>,
-    b: vec3<f32>,
-    c: vec3<f32>,
-    falloff: f32,
-}
-
-// `nothing`: how far in front of a face, in mm, what lies there is taken for the face itself. `clamped`: volumes end as printed.
-fn faced(
+// How much a triangle counts for a point, g; above 0 within its volume. `nothing`: how far in front of a face, in mm, what lies there is taken for
+// the face itself. `clamped`: volumes end as printed; a constant wherever time counts.
+fn falloff_of(
     triangle: WorldTriangle,
     share: f32,
     point: vec3<f32>,
     delta: f32,
     nothing: f32,
     clamped: bool,
-) -> Faced {
+) -> f32 {
     if share <= 0.0 {
-        return Faced(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+        return 0.0;
     }
     let kind = u32(triangle.c.w);
     let a = triangle.a.xyz - point;
@@ -100,7 +93,7 @@ fn faced(
         height = -height;
     }
     if height <= nothing || height >= delta {
-        return Faced(a, b, c, 0.0);
+        return 0.0;
     }
     let along_ab = normalize(b - a);
     let along_bc = normalize(c - b);
@@ -112,17 +105,17 @@ fn faced(
         dot(c, cross(face, along_ca)),
     );
     let near = clamp(1.0 - outside / delta, vec3(0.0), vec3(1.0));
-    let falloff = share * near.x * near.y * near.z * (1.0 - height / delta);
+    let falloff = near.x * near.y * near.z * (1.0 - height / delta);
     if falloff <= 0.0 {
-        return Faced(a, b, c, 0.0);
+        return 0.0;
     }
     if clamped {
-        return Faced(a, b, c, select(0.0, falloff, in_clamped(a, b, c, face, delta)));
+        return select(0.0, share * falloff, in_clamped(a, b, c, face, delta));
     }
     if (kind & SLIVER) != 0u && !in_box(a, b, c, face, delta) {
-        return Faced(a, b, c, 0.0);
+        return 0.0;
     }
-    return Faced(a, b, c, falloff);
+    return share * falloff;
 }
 
 // What a triangle at these corners contributes to a point's occlusion: falloff times exact occlusion.
@@ -135,11 +128,16 @@ fn contribution(
     nothing: f32,
     clamped: bool,
 ) -> f32 {
-    let seen = faced(triangle, share, point, delta, nothing, clamped);
-    if seen.falloff <= 0.0 {
+    let falloff = falloff_of(triangle, share, point, delta, nothing, clamped);
+    if falloff <= 0.0 {
         return 0.0;
     }
-    return seen.falloff * occlusion_by(seen.a, seen.b, seen.c, normal);
+    let a = triangle.a.xyz - point;
+    let b = triangle.b.xyz - point;
+    let c = triangle.c.xyz - point;
+    // Of two sides the one that faces the point.
+    let behind = dot(a, cross(b - a, c - a)) > 0.0;
+    return falloff * occlusion_by(a, select(b, c, behind), select(c, b, behind), normal);
 }
 
 // Of delta: the farthest that a clamped corner is from the triangle's.

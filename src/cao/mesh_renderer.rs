@@ -53,7 +53,7 @@ impl MeshRenderer {
         occlusion.check()?;
         let delta_mm = occlusion.delta_mm(world.bounds());
         let method: Box<dyn PixelAmbient> = match occlusion.method {
-            PixelMethod::Aov => Box::new(ByVolumes::new(gpu, occlusion.sparse)?.clamped(occlusion.clamp)),
+            PixelMethod::Aov => Box::new(ByVolumes::new(gpu, occlusion.sparse, occlusion.clamp)?),
             PixelMethod::Rays => Box::new(ByRays::new(gpu, occlusion.rays)?),
             PixelMethod::Crytek | PixelMethod::Volumetric | PixelMethod::Hbao => {
                 let method = image_method(&occlusion, delta_mm);

@@ -26,7 +26,7 @@ fn sums_of(gpu: &cao_gpu::Gpu, pixels: &Pixels, delta: f32) -> Vec<f32> {
 
 fn sums_in(gpu: &cao_gpu::Gpu, pixels: &Pixels, delta: f32, clamped: bool) -> Vec<f32> {
     let volumes = pixels.surfaces.volumes(gpu, delta, clamped).unwrap();
-    let (gather, accessibility) = (Gather::new(gpu).unwrap(), pixels.values(gpu));
+    let (gather, accessibility) = (Gather::new(gpu, clamped).unwrap(), pixels.values(gpu));
     let scene =
         Scene { geometry: &pixels.geometry, surfaces: &pixels.surfaces, volumes: &volumes, delta_mm: delta };
     run(gpu, |rec| gather.record_full(rec, scene, 0..pixels.geometry.size()[1], &accessibility).unwrap());
@@ -104,7 +104,7 @@ fn blocks_are_their_middle_pixels() {
     let pixels = Pixels::new(&gpu, &corner(), &corner_eyes(SIZE), SIZE);
     let full = sums_of(&gpu, &pixels, 40.0);
     let volumes = pixels.surfaces.volumes(&gpu, 40.0, false).unwrap();
-    let gather = Gather::new(&gpu).unwrap();
+    let gather = Gather::new(&gpu, false).unwrap();
     for step in [3, 5, 15] {
         let blocks = Blocks::new(&gpu, &pixels.geometry, step).unwrap();
         let scene = Scene {
@@ -162,6 +162,16 @@ fn corners_sharper_than_60_degrees_are_clamped() {
     }
     // What is left is what it was.
     assert_eq!(dark(45.0, 1.9, true), dark(45.0, 1.9, false));
+    // Pipelines of one kind take no volumes of the other.
+    let pixels = Pixels::new(&gpu, &world_of(vec![corner(45.0)]), &[ahead(Vec3::ZERO)], [1, 1]);
+    let volumes = pixels.surfaces.volumes(&gpu, delta, true).unwrap();
+    let (geometry, surfaces) = (&pixels.geometry, &pixels.surfaces);
+    let scene = Scene { geometry, surfaces, volumes: &volumes, delta_mm: delta };
+    let mut rec = gpu.recorder("the wrong volumes").unwrap();
+    let gather = Gather::new(&gpu, false).unwrap();
+    let refused = gather.record_full(&mut rec, scene, 0..1, &pixels.values(&gpu)).unwrap_err().to_string();
+    assert!(refused.contains("clamped corners, or neither"), "{refused}");
+    drop((rec, pixels, volumes));
     // A needle, of which the box is left where it is not clamped: beyond 2 δ nothing is.
     let [boxed, clamped] = [false, true].map(|clamped| [0.9, 2.1].map(|beyond| dark(2.0, beyond, clamped)));
     assert!(

@@ -22,7 +22,7 @@ fn means_are_the_twins_and_what_is_left_is_computed() {
     let (world, views) = (corner(), corner_eyes(SIZE));
     let pixels = Pixels::new(&gpu, &world, &views, SIZE);
     let volumes = pixels.surfaces.volumes(&gpu, DELTA, false).unwrap();
-    let (gather, upsample) = (Gather::new(&gpu).unwrap(), Upsample::new(&gpu).unwrap());
+    let (gather, upsample) = (Gather::new(&gpu, false).unwrap(), Upsample::new(&gpu).unwrap());
     let scene =
         Scene { geometry: &pixels.geometry, surfaces: &pixels.surfaces, volumes: &volumes, delta_mm: DELTA };
     let every = pixels.values(&gpu);

@@ -31,12 +31,10 @@ fn occlusion(gpu: &Gpu, pixels: &Pixels, delta_mm: f32, method: &mut dyn PixelAm
 fn others(world: &World, delta: f32, clamped: bool) -> f64 {
     let gpu = open();
     let pixels = Pixels::new(&gpu, world, &corner_eyes(SIZE), SIZE);
-    let gathered = ByVolumes::new(&gpu, 1).unwrap();
-    let expected = occlusion(&gpu, &pixels, delta, &mut gathered.clamped(clamped));
+    let expected = occlusion(&gpu, &pixels, delta, &mut ByVolumes::new(&gpu, 1, clamped).unwrap());
     let mut worst = 0.0f64;
     for is_static in [false, true] {
-        let drawn = Volumes::new(&gpu, is_static).unwrap();
-        let found = occlusion(&gpu, &pixels, delta, &mut drawn.clamped(clamped));
+        let found = occlusion(&gpu, &pixels, delta, &mut Volumes::new(&gpu, is_static, clamped).unwrap());
         let other = found.iter().zip(&expected).filter(|(a, b)| (**a - **b).abs() > ROUNDING).count();
         worst = worst.max(other as f64 / found.len() as f64);
     }

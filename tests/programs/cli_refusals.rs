@@ -315,6 +315,7 @@ fn wrong_command_lines_are_told_the_flag_and_what_it_takes() {
         ("verify builtin:engine:8 --seed -1", &["--seed"]),
         ("verify builtin:engine:8 --shapes pyramid", &["pyramid"]),
         ("verify builtin:engine:8 --method ssao", &["--method", "all"]),
+        ("chart -o out --data scan.obj", &["--data", "--paper or --meshes"]),
         ("info", &["<INPUT>"]),
         ("devices all", &["all"]),
     ] {

@@ -142,7 +142,6 @@ pub struct ByVolumes {
     gather: Gather,
     upsample: Upsample,
     step: u32,
-    clamped: bool,
     made: Option<(VolumeTree, Option<Blocks>)>,
 }
 
@@ -150,20 +149,9 @@ pub struct ByVolumes {
 const PIXELS_OF_A_PART: u32 = 1 << 14;
 
 impl ByVolumes {
-    /// Every `step`-th pixel in each direction.
-    pub fn new(gpu: &Gpu, step: u32) -> Result<Self> {
-        Ok(Self {
-            gather: Gather::new(gpu)?,
-            upsample: Upsample::new(gpu)?,
-            step,
-            clamped: false,
-            made: None,
-        })
-    }
-
-    /// With volumes whose corners are clamped as printed (AOV §5.2), before it is prepared.
-    pub fn clamped(self, clamped: bool) -> Self {
-        Self { clamped, ..self }
+    /// Every `step`-th pixel in each direction, by volumes whose corners are `clamped` as printed (AOV §5.2) or not.
+    pub fn new(gpu: &Gpu, step: u32, clamped: bool) -> Result<Self> {
+        Ok(Self { gather: Gather::new(gpu, clamped)?, upsample: Upsample::new(gpu)?, step, made: None })
     }
 
     /// Some thousands of pixels, whole workgroups.
@@ -176,7 +164,7 @@ impl ByVolumes {
 impl PixelAmbient for ByVolumes {
     fn prepare(&mut self, on: &Pixels) -> Result<()> {
         let blocks = (self.step > 1).then(|| Blocks::new(on.gpu, on.geometry, self.step)).transpose()?;
-        self.made = Some((on.surfaces.volumes(on.gpu, on.delta_mm, self.clamped)?, blocks));
+        self.made = Some((on.surfaces.volumes(on.gpu, on.delta_mm, self.gather.clamped)?, blocks));
         Ok(())
     }
 

@@ -2,9 +2,9 @@
 //!
 //! `AO(x) = min(1, Σ_P g_P(x)·AO_P(x))`. In: geometry, a world, the tree of its volumes. Out: 1 − AO a pixel. Cost: the triangles within δ of each pixel.
 
-use crate::Result;
 use crate::mesh::geometry::Geometry;
 use crate::mesh::surfaces::{Surfaces, VolumeTree};
+use crate::{Error, Result};
 use cao_gpu::{Access, Buffer, BufferUse, Gpu, Pipeline, Recorder};
 use cao_kernels::gather as kernel;
 use std::ops::Range;
@@ -21,6 +21,8 @@ pub struct Gather {
     full: Pipeline,
     sparse: Pipeline,
     failed: Pipeline,
+    /// For volumes whose corners are clamped, and for no others?
+    pub clamped: bool,
 }
 
 /// What is occluded, and by what.
@@ -64,14 +66,24 @@ impl Blocks {
 }
 
 impl Gather {
-    /// Builds the pipelines.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
+    /// Builds the pipelines, for volumes whose corners are `clamped` as printed or not.
+    pub fn new(gpu: &Gpu, clamped: bool) -> Result<Self> {
         let pipeline = |entry| gpu.compute(&kernel::SHADER, entry);
-        Ok(Self { full: pipeline("full")?, sparse: pipeline("sparse")?, failed: pipeline("failed")? })
+        let [full, sparse, failed] = match clamped {
+            true => ["full_clamped", "sparse_clamped", "failed_clamped"],
+            false => ["full", "sparse", "failed"],
+        };
+        Ok(Self { full: pipeline(full)?, sparse: pipeline(sparse)?, failed: pipeline(failed)?, clamped })
     }
 
-    fn params(scene: Scene, blocks: [u32; 2], step: u32) -> kernel::GatherParams {
-        kernel::GatherParams {
+    fn params(&self, scene: Scene, blocks: [u32; 2], step: u32) -> Result<kernel::GatherParams> {
+        if scene.volumes.clamped != self.clamped {
+            return Err(Error::refused(
+                "volumes",
+                "are not those of the pipelines: make both with clamped corners, or neither",
+            ));
+        }
+        Ok(kernel::GatherParams {
             size: scene.geometry.size(),
             blocks,
             step,
@@ -79,8 +91,8 @@ impl Gather {
             rows: 0,
             groups: 0,
             delta: scene.delta_mm,
-            clamped: u32::from(scene.volumes.clamped),
-        }
+            pad: Default::default(),
+        })
     }
 
     /// Every pixel of some rows of all views; `accessibility` holds an f32 for each of the picture.
@@ -103,7 +115,7 @@ impl Gather {
         let params = kernel::GatherParams {
             first_row: rows.start,
             rows: rows.len() as u32,
-            ..Self::params(scene, [0; 2], 1)
+            ..self.params(scene, [0; 2], 1)?
         };
         let over = [geometry.size()[0], rows.len() as u32, geometry.views() as u32];
         Ok(rec.dispatch_over(&self.full, &binds, bytemuck::bytes_of(&params), over)?)
@@ -120,7 +132,7 @@ impl Gather {
             geometry: &geometry.pixels,
             sparse_sums: &blocks.sums,
         };
-        let params = Self::params(scene, blocks.count, blocks.step);
+        let params = self.params(scene, blocks.count, blocks.step)?;
         let groups = [blocks.count[0], blocks.count[1], geometry.views() as u32];
         Ok(rec.dispatch(&self.sparse, &binds, bytemuck::bytes_of(&params), groups)?)
     }
@@ -145,7 +157,7 @@ impl Gather {
         };
         let pixels = (geometry.pixels.bytes() / Geometry::BYTES) as u32;
         let groups = pixels.div_ceil(PIXELS_A_GROUP).min(MOST_GROUPS);
-        let params = kernel::GatherParams { groups, ..Self::params(scene, [0; 2], 1) };
+        let params = kernel::GatherParams { groups, ..self.params(scene, [0; 2], 1)? };
         rec.barrier(&[Access::StorageWrite], &[Access::StorageRead, Access::StorageWrite]);
         rec.dispatch(&self.failed, &binds, bytemuck::bytes_of(&params), [groups, 1, 1])?;
         Ok(())

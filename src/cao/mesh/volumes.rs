@@ -44,17 +44,21 @@ struct Ready {
 }
 
 impl Volumes {
-    /// Builds the pipelines; with corners made once where the world is `is_static`.
+    /// Builds the pipelines; with corners made once where the world is `is_static`, and `clamped` as printed (AOV §5.2) or not.
     ///
     /// # Errors
     /// A queue that does no graphics; a device that cannot blend floats of 32 bits: gather the volumes there.
-    pub fn new(gpu: &Gpu, is_static: bool) -> Result<Self> {
+    pub fn new(gpu: &Gpu, is_static: bool, clamped: bool) -> Result<Self> {
+        let [dynamic, occlude, corners] = match clamped {
+            true => ["dynamic_volume_clamped", "occlude_clamped", "corners_clamped"],
+            false => ["dynamic_volume", "occlude", "corners"],
+        };
         let pipeline = |vertex| {
             gpu.graphics(
                 &kernel::SHADER,
                 &GraphicsDesc {
                     vertex,
-                    fragment: "occlude",
+                    fragment: occlude,
                     colours: &[Format::R32Float],
                     depth: Some(Format::D32Float),
                     depth_test: DepthTest::LessOrEqual,
@@ -65,9 +69,9 @@ impl Volumes {
             )
         };
         Ok(Self {
-            dynamic: pipeline("dynamic_volume")?,
+            dynamic: pipeline(dynamic)?,
             made: pipeline("static_volume")?,
-            corners: gpu.compute(&kernel::SHADER, "corners")?,
+            corners: gpu.compute(&kernel::SHADER, corners)?,
             depth: gpu.graphics(
                 &kernel::SHADER,
                 &GraphicsDesc {
@@ -80,14 +84,9 @@ impl Volumes {
             )?,
             settle: gpu.compute(&kernel::SHADER, "settle")?,
             is_static,
-            clamped: false,
+            clamped,
             world: None,
         })
-    }
-
-    /// With corners that are clamped as printed (AOV §5.2), before it is prepared.
-    pub fn clamped(self, clamped: bool) -> Self {
-        Self { clamped, ..self }
     }
 
     /// Whether a triangle's volume is a box.
@@ -95,7 +94,7 @@ impl Volumes {
         !self.clamped && is_sliver(triangle.corners)
     }
 
-    fn params(&self, on: &Pixels, view: u32, corners: u32, first: u32, count: u32) -> kernel::VolumesParams {
+    fn params(on: &Pixels, view: u32, corners: u32, first: u32, count: u32) -> kernel::VolumesParams {
         kernel::VolumesParams {
             size: on.geometry.size(),
             view,
@@ -103,7 +102,7 @@ impl Volumes {
             first,
             count,
             delta: on.delta_mm,
-            clamped: u32::from(self.clamped),
+            pad: Default::default(),
         }
     }
 
@@ -120,7 +119,7 @@ impl Volumes {
         let attachments =
             Attachments { colours: &[], depth: Some((&world.depths, None)), layer: None, at: [0; 2], size };
         let binds = kernel::WholeDepthBindings { eyes: &geometry.eyes, geometry: &geometry.pixels };
-        let params = self.params(on, view, 0, 0, 0);
+        let params = Self::params(on, view, 0, 0, 0);
         rec.draw(&self.depth, &binds, bytemuck::bytes_of(&params), attachments, 3)?;
         rec.barrier(&[Access::AttachmentWrite], &[Access::AttachmentWrite]);
         let mut clear = Some([0.0; 4]);
@@ -132,7 +131,7 @@ impl Volumes {
                 continue;
             }
             let attachments = Attachments { colours: &[(&world.sums, clear.take())], ..attachments };
-            let params = self.params(on, view, corners, first, count);
+            let params = Self::params(on, view, corners, first, count);
             let push = bytemuck::bytes_of(&params);
             if let Some(made) = &world.made {
                 let binds = kernel::StaticVolumeOccludeBindings {
@@ -158,7 +157,7 @@ impl Volumes {
         }
         rec.barrier(&[Access::AttachmentWrite], &[Access::SampledRead]);
         let binds = kernel::SettleBindings { sums: Flat::Only(&world.sums), accessibility };
-        let params = self.params(on, view, 0, 0, 0);
+        let params = Self::params(on, view, 0, 0, 0);
         Ok(rec.dispatch_over(&self.settle, &binds, bytemuck::bytes_of(&params), [size[0], size[1], 1])?)
     }
 }
@@ -193,7 +192,7 @@ impl PixelAmbient for Volumes {
         };
         if self.is_static {
             let made = gpu.buffer("corners of volumes", 128 * u64::from(count), BufferUse::Device)?;
-            let params = self.params(on, 0, 0, 0, count);
+            let params = Self::params(on, 0, 0, 0, count);
             let binds = kernel::CornersBindings {
                 items: &ready.items,
                 triangles: &surfaces.triangles,

@@ -29,10 +29,20 @@ pub fn bars(gpu: &Gpu, software: bool, rows: &mut Rows) -> Result<()> {
     let (aov, rays) = (FACTORS[0] * scene.delta_mm, scene.delta_mm);
     // Drawn, as the paper has it, is there to be compared with.
     let mut ways: Vec<(String, Make, f32, Bar)> = vec![
-        ("AOV, gathered".into(), |gpu| Ok(Box::new(ByVolumes::new(gpu, 1)?)), aov, Bar::AtMost(FULL_MS)),
-        ("AOV, drawn, static".into(), |gpu| Ok(Box::new(Volumes::new(gpu, true)?)), aov, Bar::None),
-        ("AOV, drawn, dynamic".into(), |gpu| Ok(Box::new(Volumes::new(gpu, false)?)), aov, Bar::None),
-        ("AOV, 1/25 5x5".into(), |gpu| Ok(Box::new(ByVolumes::new(gpu, 5)?)), aov, Bar::AtMost(SPARSE_MS)),
+        (
+            "AOV, gathered".into(),
+            |gpu| Ok(Box::new(ByVolumes::new(gpu, 1, false)?)),
+            aov,
+            Bar::AtMost(FULL_MS),
+        ),
+        ("AOV, drawn, static".into(), |gpu| Ok(Box::new(Volumes::new(gpu, true, false)?)), aov, Bar::None),
+        ("AOV, drawn, dynamic".into(), |gpu| Ok(Box::new(Volumes::new(gpu, false, false)?)), aov, Bar::None),
+        (
+            "AOV, 1/25 5x5".into(),
+            |gpu| Ok(Box::new(ByVolumes::new(gpu, 5, false)?)),
+            aov,
+            Bar::AtMost(SPARSE_MS),
+        ),
         (format!("rays, {RAYS}, plain"), |gpu| Ok(Box::new(ByRays::walks(gpu, RAYS)?)), rays, Bar::None),
     ];
     if gpu.ray_queries() {

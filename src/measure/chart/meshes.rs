@@ -168,9 +168,9 @@ impl Of {
     fn method(self, gpu: &Gpu, all: u32, radius_mm: f32) -> Result<Box<dyn PixelAmbient>> {
         let image = match self {
             Self::Rays(part) => return Ok(Box::new(ByRays::new(gpu, Self::rays(part, all))?)),
-            Self::Gathered(step) => return Ok(Box::new(ByVolumes::new(gpu, step)?)),
-            Self::Drawn { is_static } => return Ok(Box::new(Volumes::new(gpu, is_static)?)),
-            Self::Clamped => return Ok(Box::new(ByVolumes::new(gpu, 1)?.clamped(true))),
+            Self::Gathered(step) => return Ok(Box::new(ByVolumes::new(gpu, step, false)?)),
+            Self::Drawn { is_static } => return Ok(Box::new(Volumes::new(gpu, is_static, false)?)),
+            Self::Clamped => return Ok(Box::new(ByVolumes::new(gpu, 1, true)?)),
             Self::Volumetric(samples) => ImageMethod::Volumetric(Volumetric { radius_mm, samples }),
             Self::Crytek => ImageMethod::Crytek(Crytek { radius_mm }),
             // 16 directions in place of 16/4, a filter of 15 pixels.
@@ -280,10 +280,10 @@ pub fn measure(
 ) -> Result<Found> {
     // Pipelines last while somebody has them: compiled once for all scenes.
     let mut held: Vec<Box<dyn PixelAmbient>> = Vec::new();
-    for of in [Of::Rays(1), Of::Gathered(3), Of::Crytek] {
+    for of in [Of::Rays(1), Of::Gathered(3), Of::Clamped, Of::Crytek] {
         held.push(of.method(gpu, plan.rays, 1.0)?);
     }
-    let drawn = Volumes::new(gpu, true);
+    let drawn = Volumes::new(gpu, true, false);
     let mut scenes = Vec::new();
     let count = (SCENES.len() + more.len()) as f64;
     let built = SCENES.iter().map(|scene| MeshScene::built(scene, plan.detail.unwrap_or(scene.detail)));

@@ -67,9 +67,9 @@ pub fn run(gpu: &Gpu, plan: &Plan, progress: &mut dyn FnMut(f64)) -> Result<Find
         let held: Vec<f64> = overdraw.read(gpu, on)?.into_iter().flatten().map(f64::from).collect();
         counts.push([f64::from(reach), mean(&held)]);
         // A device that does not blend floats of 32 bits draws none.
-        let drawn = Volumes::new(gpu, true).ok();
+        let drawn = Volumes::new(gpu, true, false).ok();
         let methods: [Option<Box<dyn PixelAmbient>>; 3] = [
-            Some(Box::new(ByVolumes::new(gpu, 1)?)),
+            Some(Box::new(ByVolumes::new(gpu, 1, false)?)),
             drawn.map(|drawn| Box::new(drawn) as Box<dyn PixelAmbient>),
             Some(Box::new(ByRays::new(gpu, RAYS)?)),
         ];
