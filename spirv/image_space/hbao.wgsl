@@ -65,14 +65,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let way = params.radius * (f32(i) + jitter) / f32(STEPS);
             let at = place_of(eye, params.size, position + way * along);
             let shown = depth_at(params.size, id.z, at.xy);
-            if shown <= 0.0 {
+            // Not the pixel itself: a device may give it two positions, a rounding apart.
+            let pixel = vec2<u32>(at.xy);
+            if shown <= 0.0 || all(pixel == id.xy) {
                 continue;
             }
-            let to = position_of(eye, params.size, vec2<u32>(at.xy), shown) - position;
+            let to = position_of(eye, params.size, pixel, shown) - position;
             let squared = dot(to, to);
             let share = 1.0 - params.falloff * squared / (params.radius * params.radius);
-            // Not the pixel itself, and nothing beyond R.
-            if squared <= 0.0 || share <= 0.0 {
+            // Nothing beyond R.
+            if share <= 0.0 {
                 continue;
             }
             let sine = dot(to, back) / sqrt(squared);
