@@ -72,11 +72,8 @@ fn every_method_is_charted_and_what_the_chart_says_holds() {
     close(gpu);
     // Machines do other things meanwhile, and small scenes have more of everything that is not counted.
     let off = foreseen.minutes / minutes;
-    assert!(
-        (1.0 / FORESEEN..FORESEEN).contains(&off),
-        "{} minutes foreseen, {minutes} taken",
-        foreseen.minutes
-    );
+    println!("{} minutes foreseen, {minutes} taken", foreseen.minutes);
+    assert!((1.0 / FORESEEN..FORESEEN).contains(&off), "{off} times as long");
     assert!(foreseen.device_bytes >= scenes[0].volume.len() as u64 * 24, "{foreseen:?}");
     assert!(shares.is_sorted() && *shares.last().unwrap() <= 1.0, "{shares:?}");
     assert!(shares.last().unwrap() > &0.8, "work that nobody counted: {shares:?}");

@@ -142,7 +142,9 @@ pub struct ByVolumes {
     gather: Gather,
     upsample: Upsample,
     step: u32,
-    made: Option<(VolumeTree, Option<Blocks>)>,
+    /// Of the triangles and the reach that were prepared for: whatever the size is.
+    volumes: Option<(Buffer, f32, VolumeTree)>,
+    blocks: Option<Blocks>,
 }
 
 /// Pixels of a part of all: a tenth of a second of a software driver where each lies in some hundred volumes.
@@ -151,7 +153,19 @@ const PIXELS_OF_A_PART: u32 = 1 << 14;
 impl ByVolumes {
     /// Every `step`-th pixel in each direction, by volumes whose corners are `clamped` as printed (AOV §5.2) or not.
     pub fn new(gpu: &Gpu, step: u32, clamped: bool) -> Result<Self> {
-        Ok(Self { gather: Gather::new(gpu, clamped)?, upsample: Upsample::new(gpu)?, step, made: None })
+        Ok(Self {
+            gather: Gather::new(gpu, clamped)?,
+            upsample: Upsample::new(gpu)?,
+            step,
+            volumes: None,
+            blocks: None,
+        })
+    }
+
+    /// The tree of what is to be shaded, if it was prepared for.
+    fn volumes(&self, on: &Pixels) -> Option<&VolumeTree> {
+        let (of, delta_mm, volumes) = self.volumes.as_ref()?;
+        (of.is(&on.surfaces.triangles) && *delta_mm == on.delta_mm).then_some(volumes)
     }
 
     /// Some thousands of pixels, whole workgroups.
@@ -163,8 +177,11 @@ impl ByVolumes {
 
 impl PixelAmbient for ByVolumes {
     fn prepare(&mut self, on: &Pixels) -> Result<()> {
-        let blocks = (self.step > 1).then(|| Blocks::new(on.gpu, on.geometry, self.step)).transpose()?;
-        self.made = Some((on.surfaces.volumes(on.gpu, on.delta_mm, self.gather.clamped)?, blocks));
+        if self.volumes(on).is_none() {
+            let volumes = on.surfaces.volumes(on.gpu, on.delta_mm, self.gather.clamped)?;
+            self.volumes = Some((on.surfaces.triangles.clone(), on.delta_mm, volumes));
+        }
+        self.blocks = (self.step > 1).then(|| Blocks::new(on.gpu, on.geometry, self.step)).transpose()?;
         Ok(())
     }
 
@@ -173,13 +190,11 @@ impl PixelAmbient for ByVolumes {
     }
 
     fn record(&self, rec: &mut Recorder, on: &Pixels, part: u32, accessibility: &Buffer) -> Result<()> {
-        let Some((volumes, blocks)) = &self.made else {
-            return Err(unprepared());
-        };
+        let volumes = self.volumes(on).ok_or_else(unprepared)?;
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
         let scene = Scene { geometry, surfaces, volumes, delta_mm };
         rec.stage(stages::GATHER)?;
-        let Some(blocks) = blocks else {
+        let Some(blocks) = &self.blocks else {
             let (rows, height) = (Self::rows_of_a_part(on), geometry.size()[1]);
             let rows = part * rows..((part + 1) * rows).min(height);
             self.gather.record_full(rec, scene, rows, accessibility)?;

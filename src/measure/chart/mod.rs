@@ -391,15 +391,16 @@ impl Work {
         0.2 * samples * (2 * plan.max_voxels.min(scene.volume.len() / 5) + SURFACE) as f64
     }
 
-    /// Of the default picture: a sample of its rays takes as long as ten of the ambient rays, and it has some hundred of them.
-    fn picture(plan: &Plan) -> f64 {
-        1e3 * 2.0 * plan.pictures.map(f64::from).iter().product::<f64>()
+    /// Of the default picture: a sample of its rays takes as long as ten of the ambient rays, and a ray has some two a voxel of half an edge.
+    fn picture(scene: &Scene, plan: &Plan) -> f64 {
+        let edge = scene.volume.dims.into_iter().max().unwrap_or(0) as f64;
+        10.0 * edge * 2.0 * plan.pictures.map(f64::from).iter().product::<f64>()
     }
 
     fn of(gpu: &Gpu, scene: &Scene, plan: &Plan) -> f64 {
         let voxel = scene.volume.min_spacing() as f32;
         let pictures =
-            looks::work(voxel, &looks::settings(voxel, plan.quick), plan.runs) * Self::picture(plan);
+            looks::work(voxel, &looks::settings(voxel, plan.quick), plan.runs) * Self::picture(scene, plan);
         let entries = contender::all(&asked(scene, plan));
         let baseline = entries.iter().find(|e| is_baseline(e.method, &e.setting));
         // The baseline competes in every group.
@@ -506,7 +507,7 @@ fn looks_of(
     let ways = looks::settings(voxel as f32, plan.quick);
     let views = scene.views(plan.pictures)?;
     looks::measure(&renderer, &views, plan.pictures, voxel as f32, &ways, plan.runs, &mut |drawn| {
-        work.done += drawn * Work::picture(plan);
+        work.done += drawn * Work::picture(scene, plan);
         say("pictures", work);
     })
 }
