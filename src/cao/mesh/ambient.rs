@@ -44,15 +44,11 @@ pub struct Pixels<'a> {
 
 /// Rays: [`Trace`], or [`TraceQueries`] where the device has ray queries in hardware.
 pub struct ByRays {
-    way: Way,
+    /// For worlds with caps too, of which queries know nothing.
+    walks: Trace,
+    /// With the structure of the triangles that were prepared for.
+    queries: Option<(TraceQueries, Option<(Buffer, AccelerationStructure)>)>,
     rays: u32,
-}
-
-/// How rays find what they hit.
-enum Way {
-    Walks(Trace),
-    /// With the structure of the triangles that were prepared for, and walks for worlds with caps, which it knows nothing of.
-    Queries(TraceQueries, Trace, Option<(Buffer, AccelerationStructure)>),
 }
 
 /// Rays times pixels of a part: some hundredth of a second of a software driver at each of ten thousand triangles' depth of tree.
@@ -79,7 +75,7 @@ impl ByRays {
 
     /// So many a pixel, by walks through the tree, which every device can.
     pub fn walks(gpu: &Gpu, rays: u32) -> Result<Self> {
-        Ok(Self { way: Way::Walks(Trace::new(gpu)?), rays })
+        Ok(Self { walks: Trace::new(gpu)?, queries: None, rays })
     }
 
     /// So many a pixel, by ray queries.
@@ -87,7 +83,8 @@ impl ByRays {
     /// # Errors
     /// A device without ([`Gpu::ray_queries`]).
     pub fn queries(gpu: &Gpu, rays: u32) -> Result<Self> {
-        Ok(Self { way: Way::Queries(TraceQueries::new(gpu)?, Trace::new(gpu)?, None), rays })
+        let queries = Some((TraceQueries::new(gpu)?, None));
+        Ok(Self { queries, ..Self::walks(gpu, rays)? })
     }
 
     fn of_a_part(on: &Pixels) -> u32 {
@@ -98,7 +95,7 @@ impl ByRays {
 
 impl PixelAmbient for ByRays {
     fn prepare(&mut self, on: &Pixels) -> Result<()> {
-        let Way::Queries(.., made) = &mut self.way else { return Ok(()) };
+        let Some((_, made)) = &mut self.queries else { return Ok(()) };
         let triangles = &on.surfaces.triangles;
         if !made.as_ref().is_some_and(|(of, _)| of.is(triangles)) {
             *made = Some((triangles.clone(), on.surfaces.structure(on.gpu)?));
@@ -114,21 +111,15 @@ impl PixelAmbient for ByRays {
         let Pixels { geometry, surfaces, delta_mm, .. } = *on;
         let some = part * Self::of_a_part(on)..((part + 1) * Self::of_a_part(on)).min(self.rays);
         let rays = Rays { some, all: self.rays };
-        match &self.way {
-            Way::Queries(_, trace, _) if surfaces.caps() => {
-                rec.stage(stages::TRACE)?;
-                trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
-            }
-            Way::Walks(trace) => {
-                rec.stage(stages::TRACE)?;
-                trace.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
-            }
-            Way::Queries(trace, _, Some((of, world))) if of.is(&surfaces.triangles) => {
-                rec.stage(stages::TRACE)?;
-                trace.record(rec, (surfaces, world), geometry, delta_mm, rays, accessibility)?;
-            }
-            Way::Queries(..) => return Err(unprepared()),
-        }
+        let Some((queries, made)) = self.queries.as_ref().filter(|_| !surfaces.caps()) else {
+            rec.stage(stages::TRACE)?;
+            self.walks.record(rec, surfaces, geometry, delta_mm, rays, accessibility)?;
+            return Ok(rec.end_stage()?);
+        };
+        let made = made.as_ref().filter(|(of, _)| of.is(&surfaces.triangles));
+        let (_, world) = made.ok_or_else(unprepared)?;
+        rec.stage(stages::TRACE)?;
+        queries.record(rec, (surfaces, world), geometry, delta_mm, rays, accessibility)?;
         Ok(rec.end_stage()?)
     }
 }

@@ -3,16 +3,13 @@
 
 use crate::Result;
 use crate::mesh::geometry::Geometry;
-use crate::mesh::surfaces::{Surfaces, built};
-use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
+use crate::mesh::surfaces::{ByCaps, Surfaces};
+use cao_gpu::{Buffer, Gpu, Recorder};
 use cao_kernels::gbuffer as kernel;
-use std::sync::OnceLock;
 
 /// The kernel `gbuffer`.
 pub struct Gbuffer {
-    gpu: Gpu,
-    plain: Pipeline,
-    capped: OnceLock<Pipeline>,
+    pipelines: ByCaps,
 }
 
 impl Gbuffer {
@@ -21,8 +18,7 @@ impl Gbuffer {
 
     /// Builds the pipeline for worlds without caps.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let plain = gpu.compute(&kernel::SHADER, "main")?;
-        Ok(Self { gpu: gpu.clone(), plain, capped: OnceLock::new() })
+        Ok(Self { pipelines: ByCaps::new(gpu, &kernel::SHADER)? })
     }
 
     /// Writes the geometry, whose eyes are there, and the hits, [`Self::HIT`] bytes a pixel.
@@ -48,8 +44,6 @@ impl Gbuffer {
             hits,
         };
         let over = [width, height, geometry.views() as u32];
-        let pipeline =
-            if surfaces.caps() { built(&self.gpu, &self.capped, &kernel::SHADER)? } else { &self.plain };
-        Ok(rec.dispatch_over(pipeline, &binds, bytemuck::bytes_of(&params), over)?)
+        Ok(rec.dispatch_over(self.pipelines.of(surfaces)?, &binds, bytemuck::bytes_of(&params), over)?)
     }
 }

@@ -189,17 +189,32 @@ impl Surfaces {
     }
 }
 
-/// The pipeline `capped` of a kernel that has one for worlds with [caps](Surfaces::caps), which most do without.
-pub fn built<'a>(
-    gpu: &Gpu,
-    pipeline: &'a OnceLock<Pipeline>,
+/// A kernel with an entry point `capped` for worlds with [caps](Surfaces::caps) beside `main`: most do without, and it is built when it is needed.
+pub struct ByCaps {
+    gpu: Gpu,
     shader: &'static Shader,
-) -> Result<&'a Pipeline> {
-    if let Some(pipeline) = pipeline.get() {
-        return Ok(pipeline);
+    plain: Pipeline,
+    capped: OnceLock<Pipeline>,
+}
+
+impl ByCaps {
+    /// Builds the pipeline for worlds without caps.
+    pub fn new(gpu: &Gpu, shader: &'static Shader) -> Result<Self> {
+        let plain = gpu.compute(shader, "main")?;
+        Ok(Self { gpu: gpu.clone(), shader, plain, capped: OnceLock::new() })
     }
-    let built = gpu.compute(shader, "capped")?;
-    Ok(pipeline.get_or_init(|| built))
+
+    /// That of a world.
+    pub fn of(&self, surfaces: &Surfaces) -> Result<&Pipeline> {
+        if !surfaces.caps() {
+            return Ok(&self.plain);
+        }
+        if let Some(pipeline) = self.capped.get() {
+            return Ok(pipeline);
+        }
+        let built = self.gpu.compute(self.shader, "capped")?;
+        Ok(self.capped.get_or_init(|| built))
+    }
 }
 
 /// Corners that stick out of a volume farther than this, in deltas, make it a sliver's, unless they are clamped (AOV §5.2: at 2, which cuts

@@ -4,18 +4,15 @@
 
 use crate::host::row_of_groups;
 use crate::mesh::geometry::Geometry;
-use crate::mesh::surfaces::{Surfaces, built};
+use crate::mesh::surfaces::{ByCaps, Surfaces};
 use crate::{Error, Result};
-use cao_gpu::{Buffer, Gpu, Pipeline, Recorder};
+use cao_gpu::{Buffer, Gpu, Recorder};
 use cao_kernels::trace as kernel;
 use std::ops::Range;
-use std::sync::OnceLock;
 
 /// The kernel `trace`.
 pub struct Trace {
-    gpu: Gpu,
-    pipeline: Pipeline,
-    capped: OnceLock<Pipeline>,
+    pipelines: ByCaps,
 }
 
 /// Rays of each pixel.
@@ -58,8 +55,7 @@ impl Rays {
 impl Trace {
     /// Builds the pipeline.
     pub fn new(gpu: &Gpu) -> Result<Self> {
-        let pipeline = gpu.compute(&kernel::SHADER, "main")?;
-        Ok(Self { gpu: gpu.clone(), pipeline, capped: OnceLock::new() })
+        Ok(Self { pipelines: ByCaps::new(gpu, &kernel::SHADER)? })
     }
 
     /// Rays of all pixels, some at a time, which follow on those of the call before. `accessibility` holds an f32 a pixel, which is 1 − AO after the
@@ -90,9 +86,7 @@ impl Trace {
             accessibility,
         };
         let groups = row_of_groups(params.pixels.div_ceil(kernel::MAIN_WORKGROUP[0]));
-        let pipeline =
-            if surfaces.caps() { built(&self.gpu, &self.capped, &kernel::SHADER)? } else { &self.pipeline };
-        rec.dispatch(pipeline, &binds, bytemuck::bytes_of(&params), groups)?;
+        rec.dispatch(self.pipelines.of(surfaces)?, &binds, bytemuck::bytes_of(&params), groups)?;
         Ok(())
     }
 }

@@ -234,15 +234,7 @@ mod tests {
     use cao_model::scenes::SCENES;
 
     fn scene(of: usize, rows: &[(Of, f64, f64)]) -> SceneFound {
-        let scene = &SCENES[of];
-        let about = About {
-            name: scene.name.into(),
-            title: scene.title.into(),
-            what: scene.what.into(),
-            eye: scene.eye,
-            delta_mm: scene.delta_mm,
-            is_built: true,
-        };
+        let about = About::built(&SCENES[of]);
         let row =
             |(of, ms, error): &(Of, f64, f64)| Row { of: *of, error: *error, rmse: 0.0, ms: vec![*ms; 2] };
         SceneFound {

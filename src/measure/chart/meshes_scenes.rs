@@ -28,6 +28,20 @@ pub struct About {
     pub is_built: bool,
 }
 
+impl About {
+    /// Of one that the program makes.
+    pub(super) fn built(scene: &BuiltScene) -> Self {
+        Self {
+            name: scene.name.into(),
+            title: scene.title.into(),
+            what: scene.what.into(),
+            eye: scene.eye,
+            delta_mm: scene.delta_mm,
+            is_built: true,
+        }
+    }
+}
+
 /// A scene.
 pub struct MeshScene {
     /// What is known of it.
@@ -48,15 +62,7 @@ const SEEN: [f32; 2] = [30.0, 25.0];
 impl MeshScene {
     /// One that the program makes.
     pub fn built(scene: &BuiltScene, detail: u32) -> Self {
-        let about = About {
-            name: scene.name.into(),
-            title: scene.title.into(),
-            what: scene.what.into(),
-            eye: scene.eye,
-            delta_mm: scene.delta_mm,
-            is_built: true,
-        };
-        Self { about, instances: (scene.make)(detail) }
+        Self { about: About::built(scene), instances: (scene.make)(detail) }
     }
 
     /// A file of surfaces on a ground, which it occludes as the ground occludes it. Its longest edge becomes 600 mm; it stands on the middle of a square
